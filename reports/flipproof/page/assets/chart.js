@@ -103,30 +103,36 @@ window.flipproofChart ??= (() => {
   }
 
   // Draws {x: {low, high, label}, y: {low, high, label, log}, right, lines: [{name, x, y, label, faint}]}; returns both
-  // scales. What lies outside of the axes is cut off. The path of a line that comes again with the same axes is kept.
-  const paths = new WeakMap();
+  // scales. What lies outside of the axes is cut off. Axes that come again, and the path of a line that comes again with them, are kept.
+  const paths = new WeakMap(), drawnAxes = new WeakMap();
   function draw(svg, height, plot) {
     const right = plot.right ?? MARGIN.right;
     const width = Math.max(240, Math.round(svg.clientWidth || svg.parentElement.clientWidth));
-    svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    svg.setAttribute("height", height);
-    svg.replaceChildren();
     const inner = { width: width - MARGIN.left - right, height: height - MARGIN.top - MARGIN.bottom };
     const bottom = MARGIN.top + inner.height, scale = plot.y.log ? Math.log10 : (value) => value;
     const x = (value) => MARGIN.left + ((value - plot.x.low) / (plot.x.high - plot.x.low)) * inner.width;
     const y = (value) => MARGIN.top + (1 - (scale(value) - scale(plot.y.low)) / (scale(plot.y.high) - scale(plot.y.low))) * inner.height;
 
-    for (const { at, words: text } of marks(plot.y, Math.max(3, Math.floor(inner.height / 24)))) {
-      element("path", { class: "chart-grid", d: `M${MARGIN.left} ${y(at)}h${inner.width}` }, svg);
-      words(text, { x: MARGIN.left - 6, y: y(at) + 4, "text-anchor": "end" }, svg);
+    const axes = [width, height, right, ...[plot.x, plot.y].flatMap((axis) => [axis.low, axis.high, axis.log, axis.label])].join(" ");
+    if (drawnAxes.get(svg) === axes) while (svg.lastChild !== svg.firstChild) svg.lastChild.remove();
+    else {
+      svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+      svg.setAttribute("height", height);
+      svg.replaceChildren();
+      const frame = element("g", {}, svg);
+      for (const { at, words: text } of marks(plot.y, Math.max(3, Math.floor(inner.height / 24)))) {
+        element("path", { class: "chart-grid", d: `M${MARGIN.left} ${y(at)}h${inner.width}` }, frame);
+        words(text, { x: MARGIN.left - 6, y: y(at) + 4, "text-anchor": "end" }, frame);
+      }
+      for (const { at, words: text } of marks(plot.x, Math.max(3, Math.floor(inner.width / 70)))) {
+        element("path", { class: "chart-axis", d: `M${x(at)} ${bottom}v4` }, frame);
+        words(text, { x: x(at), y: bottom + 16, "text-anchor": "middle" }, frame);
+      }
+      element("path", { class: "chart-axis", d: `M${MARGIN.left} ${bottom}h${inner.width}` }, frame);
+      words(plot.y.label, { x: 2, y: 12 }, frame);
+      words(plot.x.label, { x: MARGIN.left + inner.width, y: height - 4, "text-anchor": "end" }, frame);
+      drawnAxes.set(svg, axes);
     }
-    for (const { at, words: text } of marks(plot.x, Math.max(3, Math.floor(inner.width / 70)))) {
-      element("path", { class: "chart-axis", d: `M${x(at)} ${bottom}v4` }, svg);
-      words(text, { x: x(at), y: bottom + 16, "text-anchor": "middle" }, svg);
-    }
-    element("path", { class: "chart-axis", d: `M${MARGIN.left} ${bottom}h${inner.width}` }, svg);
-    words(plot.y.label, { x: 2, y: 12 }, svg);
-    words(plot.x.label, { x: MARGIN.left + inner.width, y: height - 4, "text-anchor": "end" }, svg);
 
     const place = { x: MARGIN.left, y: MARGIN.top - 2, width: inner.width, height: inner.height + 4 };
     const window = element("svg", { ...place, viewBox: Object.values(place).join(" ") }, svg);
@@ -137,7 +143,6 @@ window.flipproofChart ??= (() => {
       return beyond < 0 ? line.x.length - 1 : beyond;
     };
     const tenth = (pixels) => Math.round(10 * pixels) / 10;
-    const axes = [width, height, right, ...[plot.x, plot.y].flatMap((axis) => [axis.low, axis.high])].join(" ");
     for (const line of plot.lines) {
       let path = "";
       if (paths.get(line)?.axes === axes) ({ path } = paths.get(line));

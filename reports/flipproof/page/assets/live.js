@@ -72,17 +72,22 @@ window.flipproofLive = (() => {
     // Omega, and the acceleration (y - centre) spring + push - drag v of all free slices: kept in one object, since a browser
     // makes a new number at every change of a variable that functions share.
     const felt = { spin: 0.5, spring: 0.5, centre: 0.5, push: 0.5, began: 0.5 }, hits = [];
-    let theta = theta0;
+    let theta = theta0, resting = 0, sides = 0;
+
+    // Counts slices at rest, and those at the base less those at the cap; called when one comes to rest or leaves.
+    function count() {
+      resting = sides = 0;
+      for (const end of side) { resting += end * end; sides += end; }
+    }
+    const rests = (end) => resting + end * sides > 0;
 
     // Sets what is felt, from sums over all slices; returns omega.
     function weigh(at, speeds, angle) {
-      let first = 0, second = 0, speed = 0, resting = 0, sides = 0;
+      let first = 0, second = 0, speed = 0;
       for (let i = 0; i < n; i++) {
         first += at[i];
         second += at[i] * at[i];
         speed += speeds[i];
-        resting += side[i] * side[i];
-        sides += side[i];
       }
       const body = mass + m * resting;
       const spin = momentum / inertia(first, second, (m * first) / M);
@@ -140,6 +145,7 @@ window.flipproofLive = (() => {
         else if (side[i] === end && V) { side[i] = 0; v[i] = -end * V; }
       }
       // Who is slow and pressed on comes to rest, at the expense of the tube.
+      count();
       weigh(y, v, theta);
       for (let i = 0; i < n; i++) {
         if (!side[i] && Math.abs(y[i]) === wall && Math.abs(v[i]) < rest && pressure(Math.sign(y[i])) >= 0) {
@@ -149,26 +155,30 @@ window.flipproofLive = (() => {
         }
         if (side[i]) body += ratio;
       }
+      count();
       const share = free ? (ratio * loose) / body : 0;
       if (share) for (let i = 0; i < n; i++) if (!side[i]) v[i] -= share;
     }
     // Slices at rest leave when their end would have to pull them.
     function release() {
       for (const end of ENDS) {
-        if (!side.includes(end)) continue;
+        if (!rests(end)) continue;
         weigh(y, v, theta);
-        if (pressure(end) < 0) for (let i = 0; i < n; i++) if (side[i] === end) side[i] = 0;
+        if (pressure(end) >= 0) continue;
+        for (let i = 0; i < n; i++) if (side[i] === end) side[i] = 0;
+        count();
       }
     }
 
     const centred = () => (m * y.reduce((sum, place) => sum + place, 0)) / M;
     const keep = (k) => { omega[k] = weigh(y, v, theta); seen?.(y, theta, centred()); };
+    count();
     release();
     keep(0);
     for (let k = 1; k <= (points - 1) * parts; k++) {
       let left = duration / ((points - 1) * parts);
       for (let tries = 0; left > 0 && tries < 1000; tries++) {
-        const ends = ENDS.filter((end) => side.includes(end));
+        const ends = ENDS.filter(rests);
         if (ends.length) weigh(y, v, theta);
         const pressed = ends.map(pressure), angle = step(left), turn = felt.began * left;
         let when = 1, struck = -1;

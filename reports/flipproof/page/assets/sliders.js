@@ -12,8 +12,8 @@
   let thrown = { ...start }, drawn = {}, waiting = false, touched = null;
 
   // The program makes its 1000 steps; of the equations as many points as a frame of 16 ms allows.
-  const solvers = { "published-python": [program, 1000], eq8: [eq8, 251], "free-flight": [free, 251], column: [column, 251], rods: [rods, 251] };
-  const flown = (set) => Object.fromEntries(Object.entries(solvers).map(([name, [solve, points]]) => [name, solve({ ...fixed, ...set }, points)]));
+  const solvers = { "published-python": [program, 1000], eq8: [eq8, 251], "free-flight": [free, 251, null, 1], column: [column, 251], rods: [rods, 251] };
+  const flown = (set) => Object.fromEntries(Object.entries(solvers).map(([name, [solve, ...how]]) => [name, solve({ ...fixed, ...set }, ...how)]));
   // The throw with the gravity of the report is solved anew when something else than gravity is changed.
   let usual = { key: "" };
   function unchanged(set) {
