@@ -31,7 +31,7 @@ def made():
 
 
 def measured(made):
-    return {fact.id: fact.found(made) for fact in FACTS}
+    return {fact.id: fact.finding(made) for fact in FACTS}
 
 
 @pytest.fixture(scope="module")

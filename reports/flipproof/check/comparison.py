@@ -98,27 +98,31 @@ def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
     scale = float(values[0]) if quantity == "omega" else 1.0
     if scale == 0.0:
         raise ValueError(f"{first.label}: omega is 0 at the first time; differences are taken relative to it")
-    t, values, found, interpolated = beside(t, values, times, others)
+    t, values, others, interpolated = beside(t, values, times, others)
     if len(t) < 2:
         raise ValueError(f"{first.label} has {len(t)} times within those of {second.label}; at least 2 are needed")
-    return Apart(quantity=quantity, t=t, first=values, second=found, scale=scale, interpolated=int(interpolated.sum()))
+    return Apart(quantity=quantity, t=t, first=values, second=others, scale=scale, interpolated=int(interpolated.sum()))
 
 
-def table(found: Comparison) -> str:
+def table(both: Comparison) -> str:
     """Return the comparison as lines of text."""
-    width = max(len(found.first), len(found.second), 12)
-    lines = [*found.notes, _times(found), f"{'':34}{found.first:>{width}}  {found.second:>{width}}  difference"]
+    width = max(len(both.first), len(both.second), 12)
+    lines = [
+        *both.notes,
+        _times(both),
+        f"{'':34}{both.first:>{width}}  {both.second:>{width}}  difference",
+    ]
 
     def row(words: str, numbers: tuple[float, float]) -> None:
         a, b = numbers
         lines.append(f"{words:34}{a:{width}.5f}  {b:{width}.5f}  {b - a:+.5f}")
 
-    for one in found.apart:
+    for one in both.apart:
         row(f"{SYMBOLS[one.quantity]}({one.t[-1]:.4g} s) [{UNITS[one.quantity]}]", (one.first[-1], one.second[-1]))
         if one.quantity == "omega":
             a, b = (plateau(one.t, values, one.scale) for values in (one.first, one.second))
             row("omega/omega_0, mean of second half", (a, b))
-    for one in found.apart:
+    for one in both.apart:
         largest, time = one.largest
         size = f"{largest:.3%} of omega_0" if one.quantity == "omega" else f"{largest:.3g} {UNITS[one.quantity]}"
         lines.append(f"largest |difference in {SYMBOLS[one.quantity]}|: {size} at t = {time:.5g} s")
@@ -129,23 +133,21 @@ def table(found: Comparison) -> str:
     return "\n".join(line.replace("\n", r"\n") for line in lines)
 
 
-def _times(found: Comparison) -> str:
+def _times(both: Comparison) -> str:
     """Return at which times the two are compared, and how often one of them is interpolated."""
-    counts = {(len(one.t), one.interpolated) for one in found.apart}
+    counts = {(len(one.t), one.interpolated) for one in both.apart}
     most, interpolated = max(counts)
     if not any(between for _, between in counts):
         return f"compared at {most} times that both have; nothing is interpolated"
-    return (
-        f"compared at {most} times of {found.first}; {found.second} is interpolated linearly at {interpolated} of them"
-    )
+    return f"compared at {most} times of {both.first}; {both.second} is interpolated linearly at {interpolated} of them"
 
 
-def claims(found: Comparison, tolerance: float) -> tuple[Finding, ...]:
+def claims(comparison: Comparison, tolerance: float) -> tuple[Finding, ...]:
     """Return the largest differences as findings; the first quantity is held to the tolerance, others are observed."""
     findings: list[Finding] = []
-    for k, one in enumerate(found.apart):
+    for k, one in enumerate(comparison.apart):
         largest, time = one.largest
-        title = f"largest difference in {SYMBOLS[one.quantity]} between {found.first} and {found.second}"
+        title = f"largest difference in {SYMBOLS[one.quantity]} between {comparison.first} and {comparison.second}"
         unit = "of omega_0" if one.quantity == "omega" else UNITS[one.quantity]
         about = f"compare-{one.quantity.replace('_', '-')}", title, largest, unit
         note = f"at t = {time:.6g} s"

@@ -18,7 +18,7 @@ from flipproof.output.columns import Series
 from flipproof.output.templating import environment
 
 
-def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[str, Any], found: Comparison) -> str:
+def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[str, Any], comparison: Comparison) -> str:
     """Return the page of two reports' folders, or ``summary.json``, as HTML that needs no other file and no network."""
     curves, missing = [], []
     for which, place in (("old", old), ("new", new)):
@@ -37,7 +37,7 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
             heading,
             [
                 tuple(_shown(words) for words in (titles[change.id], change.id, change.words))
-                for change in found.changes
+                for change in comparison.changes
                 if change.kind == kind
             ],
         )
@@ -46,7 +46,7 @@ def diff_page(old: Path, new: Path, before: Mapping[str, Any], after: Mapping[st
     return environment().get_template("diff.html.j2").render(
         old=str(old),
         new=str(new),
-        found=found,
+        comparison=comparison,
         groups=[(heading, changes) for heading, changes in rows if changes],
         figure=draw(figure_report_pair(curves[0], curves[1], apart)).svg if apart else "",
         largest=[(name, size[k := int(np.abs(size).argmax())], t[k]) for name, (t, size) in apart.items() if len(t)],
@@ -69,7 +69,7 @@ def read_curves(path: Path) -> Series:
     if any(len(cells) != len(header) for cells in lines):
         raise ValueError("its rows have different numbers of cells")
     columns = [np.array([float(cell) if cell else math.nan for cell in cells]) for cells in zip(*lines, strict=True)]
-    found: dict[str, tuple[Any, Any]] = {}
+    curves: dict[str, tuple[Any, Any]] = {}
     times = columns[0] if columns else np.empty(0)
     for name, values in zip(header, columns, strict=False):
         if name.startswith("t "):
@@ -77,5 +77,5 @@ def read_curves(path: Path) -> Series:
         elif name.startswith("omega/omega_0 "):
             there = ~(np.isnan(times) | np.isnan(values))
             if there.any():
-                found[name.removeprefix("omega/omega_0 ").partition(" [")[0]] = times[there], values[there]
-    return found
+                curves[name.removeprefix("omega/omega_0 ").partition(" [")[0]] = times[there], values[there]
+    return curves

@@ -17,12 +17,12 @@ def differences(old: Series, new: Series) -> dict[str, tuple[FloatArray, FloatAr
 
     The new curve is linear between its times.
     """
-    found = {}
+    differences = {}
     for name in (name for name in old if name in new):
         (t, before), (times, after) = old[name], new[name]
         together = (t >= times[0]) & (t <= times[-1])
-        found[name] = (t[together], np.interp(t[together], times, after) - before[together])
-    return found
+        differences[name] = (t[together], np.interp(t[together], times, after) - before[together])
+    return differences
 
 
 @styled

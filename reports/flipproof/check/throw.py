@@ -120,8 +120,8 @@ def line(finding: Finding, needs: str) -> str:
     note = " ".join(finding.note.split())
     if finding.value is None:
         return f"{word}  {finding.id}: not evaluated: {note}"
-    found = f"{finding.value:.6g} {finding.unit}".strip()
-    return f"{word}  {finding.id}: {found}; {needs}" + (f" ({note})" if finding.failed and note else "")
+    findings = f"{finding.value:.6g} {finding.unit}".strip()
+    return f"{word}  {finding.id}: {findings}; {needs}" + (f" ({note})" if finding.failed and note else "")
 
 
 def _threshold(admissible: tuple[float, float], value: float | None) -> str:

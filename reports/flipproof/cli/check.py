@@ -68,15 +68,15 @@ def command_diff(options: argparse.Namespace) -> int:
     from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
 
     old, new = read_summary(options.old), read_summary(options.new)
-    found = compare_summaries(old, new, TOLERANCE if options.tolerance is None else options.tolerance)
+    comparison = compare_summaries(old, new, TOLERANCE if options.tolerance is None else options.tolerance)
     if options.html:
         from flipproof.check.diff_page import diff_page
         from flipproof.output.folder import write_text
 
-        write_text(options.html, diff_page(options.old, options.new, old, new, found))
-    write_json(options.json, found.to_mapping())
-    print(inert(found.text))
-    return 0 if found.same else 1
+        write_text(options.html, diff_page(options.old, options.new, old, new, comparison))
+    write_json(options.json, comparison.to_mapping())
+    print(inert(comparison.text))
+    return 0 if comparison.same else 1
 
 
 def command_check(options: argparse.Namespace) -> int:
@@ -103,14 +103,16 @@ def command_check(options: argparse.Namespace) -> int:
         print(inert(line, lines=False), flush=True)
 
     with store_of(options) as store:
-        found = check(
+        checked = check(
             scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store,
             guests=options.guests, timeout=options.timeout,
         )  # fmt: skip
-    write_junit(options.junit, found.findings, "flipproof check", found.seconds)
-    write_json(options.json, {"findings": [one.to_mapping() for one in found.findings], "conclusion": found.conclusion})
-    print(inert(found.conclusion), flush=True)
-    return 1 if found.failed else 0
+    write_junit(options.junit, checked.findings, "flipproof check", checked.seconds)
+    write_json(
+        options.json, {"findings": [one.to_mapping() for one in checked.findings], "conclusion": checked.conclusion}
+    )
+    print(inert(checked.conclusion), flush=True)
+    return 1 if checked.failed else 0
 
 
 def _groups(text: str) -> tuple[str, ...]:
@@ -191,20 +193,20 @@ def _compare_curves(options: argparse.Namespace) -> int:
     first, second = (read(name, options.columns) for name in (options.first, options.second))
     twins, others = ([read(path, options.columns) for path in paths] for paths in (options.twin, options.twin_of_b))
     allowed = None if options.from_twins else TOLERANCE if options.tolerance is None else options.tolerance
-    found = compare(
+    comparison = compare(
         first, second, twins=twins, twins_of_second=others, columns=options.columns, tolerance=allowed,
         shift=options.shift,
     )  # fmt: skip
-    write_json(options.json, found.to_mapping())
-    write_junit(options.junit, found.findings, "flipproof compare")
+    write_json(options.json, comparison.to_mapping())
+    write_junit(options.junit, comparison.findings, "flipproof compare")
     if options.plot:
         from flipproof.curves.figure import picture
 
-        drawing = picture(found)
+        drawing = picture(comparison)
         options.plot.write_bytes(drawing.png if options.plot.suffix == ".png" else drawing.svg.encode())
-    for line in found.lines:
+    for line in comparison.lines:
         print(inert(line, lines=False))
-    return 0 if found.passed else 1
+    return 0 if comparison.passed else 1
 
 
 def command_compare(options: argparse.Namespace) -> int:

@@ -101,10 +101,10 @@ def _value(tree: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
 def _class_of(name: str) -> type[Any]:
     """Return a data class or named tuple of this program by "module:name"; a TypeError refuses everything else."""
     module, _, inner = name.partition(":")
-    found: Any = getattr(import_module(module), inner, None) if module.partition(".")[0] in OWN else None
-    if not (isinstance(found, type) and (is_dataclass(found) or _is_named_tuple(found)) and found.__module__ == module):
+    kind: Any = getattr(import_module(module), inner, None) if module.partition(".")[0] in OWN else None
+    if not (isinstance(kind, type) and (is_dataclass(kind) or _is_named_tuple(kind)) and kind.__module__ == module):
         raise TypeError(f"{name} is no data class of this program")
-    return found
+    return kind
 
 
 def _is_named_tuple(kind: type[Any]) -> bool:

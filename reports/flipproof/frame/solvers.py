@@ -147,11 +147,11 @@ def make(run: Run) -> Made:
     began = time.perf_counter()
     trajectory, reason = None, ""
     try:
-        found = solve(run.solver, run.scenario, **run.settings)
-        if len(found.t):
-            trajectory = found
+        flight = solve(run.solver, run.scenario, **run.settings)
+        if len(flight.t):
+            trajectory = flight
         else:
-            reason = f"{found.status}: {found.message}"
+            reason = f"{flight.status}: {flight.message}"
     except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
         reason = f"{type(error).__name__}: {error}"
     return Made(run, trajectory, time.perf_counter() - began, reason)

@@ -25,17 +25,17 @@ def compact_svg(svg: str) -> str:
     ids = re.compile(r'(?<= id=")[^"]*')
     svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", svg, flags=re.S)
     coordinates = r'(?<= )(?:d|x|y|points)="[^"]*"|translate\([^)]*\)'
-    svg = re.sub(coordinates, lambda found: number.sub(_rounded, found.group()), svg)
-    svg = re.sub(r'(?<= )d="[^"]*"', lambda found: 'd="' + commands.sub(r"\1", found.group()[3:]), svg)
+    svg = re.sub(coordinates, lambda match: number.sub(_rounded, match.group()), svg)
+    svg = re.sub(r'(?<= )d="[^"]*"', lambda match: 'd="' + commands.sub(r"\1", match.group()[3:]), svg)
     styles = r'(?<= )style="[^"]*"'
-    svg = re.sub(styles, lambda found: 'style="' + found.group()[7:].replace(": ", ":").replace("; ", ";"), svg)
+    svg = re.sub(styles, lambda match: 'style="' + match.group()[7:].replace(": ", ":").replace("; ", ";"), svg)
     used = set(re.findall(r"#([\w.-]+)", svg))
-    svg = re.sub(r'<g id="([^"]*)"', lambda found: found.group() if found.group(1) in used else "<g", svg)
+    svg = re.sub(r'<g id="([^"]*)"', lambda match: match.group() if match.group(1) in used else "<g", svg)
     svg = svg.replace("xlink:href", "href")
     names = {name: f"i{k:x}" for k, name in enumerate(dict.fromkeys(ids.findall(svg)))}
-    svg = ids.sub(lambda found: names[found.group()], svg)
+    svg = ids.sub(lambda match: names[match.group()], svg)
     targets = r'(?<=href="#)[^"]*|(?<=url\(#)[^)]*'
-    svg = re.sub(targets, lambda found: names.get(found.group(), found.group()), svg)
+    svg = re.sub(targets, lambda match: names.get(match.group(), match.group()), svg)
     return re.sub(r"\s*\n\s*", " ", svg).strip()
 
 
@@ -51,15 +51,15 @@ def shape(svg: str) -> Markup:
 
     With them the least width [px] at which its smallest letters have 9 px; Matplotlib draws letters as paths.
     """
-    found = SIZE.search(svg)
-    if found is None:
+    match = SIZE.search(svg)
+    if match is None:
         return Markup("")
-    width, height = map(float, found.groups())
+    width, height = map(float, match.groups())
     letters = [100.0 * float(scale) for scale in LETTERS.findall(svg)]
     least = width * 9.0 / min(letters, default=9.0)
     return Markup(' width="{}" height="{}" style="--least:{}px"').format(round(width), round(height), round(least))
 
 
-def _rounded(found: re.Match[str]) -> str:
-    text = f"{float(found.group()):.{DIGITS}f}".rstrip("0").rstrip(".")
+def _rounded(match: re.Match[str]) -> str:
+    text = f"{float(match.group()):.{DIGITS}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text

@@ -23,7 +23,7 @@ def typeset(text: str) -> str:
 
 def mathematics(text: str) -> str:
     """Return plain-text mathematics with primes, minus signs and tau as they are printed."""
-    text = re.sub(r"(?<=\b[rv])'{1,2}", lambda found: "″" if len(found.group()) == 2 else "′", text)
+    text = re.sub(r"(?<=\b[rv])'{1,2}", lambda match: "″" if len(match.group()) == 2 else "′", text)
     return re.sub(r"(?<![\w)])-(?=\d)", "−", text).replace("(tau ", "(τ ")
 
 

@@ -161,14 +161,14 @@ def _plateau_range(flights: Flights) -> Iterator[Reading]:
 
 def share_in_range(flights: Flights) -> float:
     """Return the share of the intermediate fillings at which omega_f / omega_0 lies in the paper's range."""
-    found = flights.measured("filling", level, *INTERMEDIATE).values()
-    return sum(OPTIMUM[0] <= value <= OPTIMUM[1] for value in found) / len(found)
+    levels = flights.measured("filling", level, *INTERMEDIATE).values()
+    return sum(OPTIMUM[0] <= value <= OPTIMUM[1] for value in levels) / len(levels)
 
 
 def plateau_range_words(flights: Flights) -> str:
     """Return between which values omega_f / omega_0 lies at the intermediate fillings."""
-    found = flights.measured("filling", level, *INTERMEDIATE).values()
-    return f"ω_f/ω₀ from {min(found):.3f} to {max(found):.3f} at {len(found)} fillings"
+    levels = flights.measured("filling", level, *INTERMEDIATE).values()
+    return f"ω_f/ω₀ from {min(levels):.3f} to {max(levels):.3f} at {len(levels)} fillings"
 
 
 def _by_points(flights: Flights) -> str:
@@ -217,8 +217,8 @@ _slow_down_at_a_tenth: Final = _about_slowing(
 
 def filling_of_slow_down(flights: Flights) -> float:
     """Return the least filling with omega_f = 0.8 omega_0, interpolated between flights; NaN if there is none."""
-    found = sorted(flights.measured("filling", level).items())
-    for (low, above), (high, below) in pairwise(found):
+    levels = sorted(flights.measured("filling", level).items())
+    for (low, above), (high, below) in pairwise(levels):
         if above >= CLEAR > below:
             return low + (high - low) * (above - CLEAR) / (above - below)
     return math.nan
@@ -269,9 +269,9 @@ def _agreement_is_excellent(flights: Flights) -> Iterator[Reading]:
     why="The sentence is a comparison: its threshold is zero.",
 )
 def _best_filling(flights: Flights) -> Iterator[Reading]:
-    found = flights.measured("filling", level)
+    levels = flights.measured("filling", level)
     inside = flights.measured("filling", level, *OPTIMUM)
     best, lowest = min(inside.items(), key=itemgetter(1))
-    rival, other = min(((filling, found[filling]) for filling in found if filling not in inside), key=itemgetter(1))
+    rival, other = min(((filling, levels[filling]) for filling in levels if filling not in inside), key=itemgetter(1))
     note = f"{lowest:.3f} at M̃ = {best:g}, {other:.3f} at {rival:g}"
     yield Reading("lowest ω_f outside 0.2 to 0.5 minus lowest inside", other - lowest, OMEGA, at_least(0.0), note=note)

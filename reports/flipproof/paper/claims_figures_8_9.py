@@ -153,8 +153,8 @@ def toppling_peak() -> tuple[float, float]:
     def lowered(filling: float) -> float:
         return -static_toppling_angle(paper_throw(filling))
 
-    found = minimize_scalar(lowered, bounds=(1e-3, 1.0), method="bounded", options={"xatol": 1e-9})
-    return float(found.x), -float(found.fun)
+    minimum = minimize_scalar(lowered, bounds=(1e-3, 1.0), method="bounded", options={"xatol": 1e-9})
+    return float(minimum.x), -float(minimum.fun)
 
 
 @states(

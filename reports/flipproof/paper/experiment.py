@@ -281,5 +281,5 @@ def standing(observations: Sequence[Observation]) -> dict[str, tuple[int, int]]:
 
 def closest_overall(observations: Sequence[Observation]) -> tuple[str, ...]:
     """Return the equation that agrees with most statements; among several, those that are most often the closest."""
-    found = standing(observations)
-    return tuple(solver for solver in found if found[solver] == max(found.values()))
+    counts = standing(observations)
+    return tuple(solver for solver in counts if counts[solver] == max(counts.values()))

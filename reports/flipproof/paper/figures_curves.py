@@ -233,10 +233,10 @@ def _steps(runs: PaperRuns, solver: str) -> Iterator[Line]:
 
 def _step_words(runs: PaperRuns) -> Iterator[str]:
     for filling in numbers("figure-S1-filling"):
-        found = {case.value: run for case, run in runs.members(PUBLISHED, f"steps {filling:g}")}
-        *fewer, most = sorted(found) or [0.0]
+        by_value = {case.value: run for case, run in runs.members(PUBLISHED, f"steps {filling:g}")}
+        *fewer, most = sorted(by_value) or [0.0]
         for steps in fewer:
-            run, finest = found[steps], found[most]
+            run, finest = by_value[steps], by_value[most]
             there = np.interp(run.t, finest.t, finest.omega)
             far = float(np.abs(run.omega - there).max()) / run.scenario.omega0
             yield f"filling {filling:g} with {steps:g} steps {far:.2g}"

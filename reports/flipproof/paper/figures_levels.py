@@ -34,9 +34,9 @@ class Points:
 
     def line(self, solver: str) -> Line:
         """Return the points of one solver."""
-        found = self.values[solver]
+        curves = self.values[solver]
         look = panels.dots(solver_style(solver)["color"], filled=self.filled, joined=self.filled)
-        return Line(self.label, np.array(list(found)), np.array(list(found.values())), look)
+        return Line(self.label, np.array(list(curves)), np.array(list(curves.values())), look)
 
     def words(self, digits: int) -> str:
         """Return the numbers as words."""
@@ -45,8 +45,8 @@ class Points:
 
 def _points(runs: PaperRuns, label: str, family: str, of: Callable[[Trajectory], float], *, filled: bool) -> Points:
     """Return the points where there is a number, which is finite."""
-    found = {solver: [(case.value, of(run)) for case, run in runs.members(solver, family)] for solver in SOLVERS}
-    finite = {solver: {at: value for at, value in own if math.isfinite(value)} for solver, own in found.items()}
+    curves = {solver: [(case.value, of(run)) for case, run in runs.members(solver, family)] for solver in SOLVERS}
+    finite = {solver: {at: value for at, value in own if math.isfinite(value)} for solver, own in curves.items()}
     return Points(label, filled, finite)
 
 
@@ -91,8 +91,8 @@ def _exhibits_9b(runs: PaperRuns) -> Iterator[Exhibit]:
 
 def _exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
     upright, landed = _at_two_moments(runs, lambda moment: moment.v_cm)
-    found = [abs(v) for points in (upright, landed) for values in points.values.values() for v in values.values()]
-    most = 1.1 * max([*found, 0.25])
+    curves = [abs(v) for points in (upright, landed) for values in points.values.values() for v in values.values()]
+    most = 1.1 * max([*curves, 0.25])
     row = _row(Axis("v_CM in the bottle [m/s], to the base", "v_CM [m/s]", -most, most), (upright, landed))
     bands = (
         panels.Band("x", 0.25, 0.6, "where the paper has it beyond 0.2 m/s"),

@@ -223,9 +223,9 @@ def settings_words() -> str:
 
 def listed(values_of: Callable[[str], Mapping[str, float]], digits: int = 3) -> str:
     """Return label -> number of every solver as words; a solver without any is left out."""
-    found = {solver: values_of(solver) for solver in SOLVERS}
+    panels = {solver: values_of(solver) for solver in SOLVERS}
     return "; ".join(
         f"{SPOKEN[solver]}: " + ", ".join(f"{label} {value:.{digits}f}" for label, value in values.items())
-        for solver, values in found.items()
+        for solver, values in panels.items()
         if values
     )

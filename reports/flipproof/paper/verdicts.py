@@ -87,14 +87,14 @@ class PaperVerdicts:
     def closest(self) -> str:
         """Which equation comes closest to what the text says of the experiment, in words."""
         best = " and ".join(CONTEST[solver] for solver in closest_overall(self.comparisons))
-        found = standing(self.comparisons)
+        score = standing(self.comparisons)
         counted = "; ".join(
             f"{CONTEST[solver]} agrees with {agrees} and is the closest, or level with it, for {nearest}"
-            for solver, (agrees, nearest) in sorted(found.items(), key=lambda each: each[1], reverse=True)
+            for solver, (agrees, nearest) in sorted(score.items(), key=lambda each: each[1], reverse=True)
         )
         total, telling = len(self.comparisons), sum(each.discriminates for each in self.comparisons)
         return (
-            f"Closest to the experiment as the text tells it, of {len(found)}: {best}. Of {total} statements {telling} "
+            f"Closest to the experiment as the text tells it, of {len(score)}: {best}. Of {total} statements {telling} "
             f"tell equations apart; with each of the other {total - telling} all agree, or none. Of all {total}, "
             f"{counted}. {FREEDOM}"
         )

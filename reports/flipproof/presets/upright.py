@@ -67,16 +67,16 @@ def make_upright(
 
     aims, unaimed = aiming(throw, size)
     throws = counting(throw, size, aims, make("aims", aims))
-    found = read(throw, size, throws, make("throws", throws), unaimed)
+    results = read(throw, size, throws, make("throws", throws), unaimed)
     say("figures")
-    write_whole(out / "upright.csv", shares_csv(found).encode())
-    write_whole(out / "map.csv", map_csv(found).encode())
-    for exhibit in figures(found):
+    write_whole(out / "upright.csv", shares_csv(results).encode())
+    write_whole(out / "map.csv", map_csv(results).encode())
+    for exhibit in figures(results):
         drawing = exhibit.drawing
         write_whole(out / f"{exhibit.name}.svg", drawing.svg.encode())
         write_whole(out / f"{exhibit.name}.png", drawing.png)
-    lines = [share_line(found, family) for family in size.families]
-    return "\n".join([*lines, f"({found.assumed})", *told, f"Tables and figures: {out}"])
+    lines = [share_line(results, family) for family in size.families]
+    return "\n".join([*lines, f"({results.assumed})", *told, f"Tables and figures: {out}"])
 
 
 def _own(out: Path) -> None:

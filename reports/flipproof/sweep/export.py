@@ -55,10 +55,10 @@ def table(
     fields_of = map(_fields, points) if swept is None else swept
     for number, (point, fields, row) in enumerate(zip(points, fields_of, rows_of(store, points), strict=True)):
         assert row is not None
-        found = {name: value for name, value in row.items() if name not in CURVES}
+        scalars = {name: value for name, value in row.items() if name not in CURVES}
         if number == 0:
-            yield [*fields, "solver", "settings", *found]
-        yield [*fields.values(), point.solver, json_of(point.settings), *found.values()]
+            yield [*fields, "solver", "settings", *scalars]
+        yield [*fields.values(), point.solver, json_of(point.settings), *scalars.values()]
 
 
 def _fields(point: Point) -> dict[str, Any]:

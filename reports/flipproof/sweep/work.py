@@ -241,10 +241,10 @@ def read_flight(flight: Trajectory | Row) -> Row:
     if flight.status in WHOLE:
         # A number out of range is missing with a reason here; it must not also appear as a warning.
         with np.errstate(all="ignore"):
-            found = {"plateau": plateau(flight.t, flight.omega, flight.scenario.omega0)}
-        found |= {f"{name}_end": float(getattr(flight, name)[-1]) for name in ("omega", "theta", "r_cm")}
-        row |= {name: value if math.isfinite(value) else None for name, value in found.items()}
-        reasons += [f"{name} is not finite" for name in found if row[name] is None]
+            readings = {"plateau": plateau(flight.t, flight.omega, flight.scenario.omega0)}
+        readings |= {f"{name}_end": float(getattr(flight, name)[-1]) for name in ("omega", "theta", "r_cm")}
+        row |= {name: value if math.isfinite(value) else None for name, value in readings.items()}
+        reasons += [f"{name} is not finite" for name in readings if row[name] is None]
         if "r_cm" in flight.diagnostics.get("not_given", ()):
             row["r_cm_end"] = None
             reasons.append(f"{flight.method} gives no r_cm")

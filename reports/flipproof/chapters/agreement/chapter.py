@@ -181,9 +181,9 @@ def band_over_time(run: Run, other: Run, flights: Flights) -> FloatArray:
     return np.asarray(np.maximum.accumulate(np.maximum(moved, FLOOR)))
 
 
-def claims(found: Mapping[str, Agreement]) -> Claims:
+def claims(results: Mapping[str, Agreement]) -> Claims:
     """Yield for each equation the largest difference of a pair, and which solver differs from all others."""
-    for equation, agreement in found.items():
+    for equation, agreement in results.items():
         widest = max(agreement.pairs, key=lambda pair: pair.largest)
         pairs = [f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs]
         id_ = "agreement" if equation == FREE else f"agreement-{equation}"

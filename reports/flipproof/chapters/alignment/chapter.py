@@ -45,23 +45,23 @@ def study(ask: Ask) -> Study[Pairs]:
     }
 
 
-def claims(found: Pairs) -> Claims:
+def claims(results: Pairs) -> Claims:
     """Yield the share of the time that each second curve spends in the tube around the first: early is no failure."""
-    for (first, second), (_, tube) in found.items():
+    for (first, second), (_, tube) in results.items():
         if tube.found is None:
             yield Absent(f"tube-{first}-{second}", f"tube of {first} and {second}", tube.reason, "observation")
         else:
             title = f"{second} in the tube around {first}: share of the time"
             yield observed(f"tube-{first}-{second}", title, tube.found.share, "", tube.found.words)
-    for (first, second), (aligned, _) in found.items():
+    for (first, second), (aligned, _) in results.items():
         if aligned.found is None:
             title = f"alignment of {first} and {second}"
             yield Absent(f"alignment-{first}-{second}", title, aligned.reason, "observation")
 
 
-def figures(found: Pairs) -> Iterator[Exhibit]:
+def figures(results: Pairs) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
-    for (first, second), alignment in known({pair: aligned for pair, (aligned, _) in found.items()}).items():
+    for (first, second), alignment in known({pair: aligned for pair, (aligned, _) in results.items()}).items():
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",

@@ -217,7 +217,7 @@ def rest_intervals(run: Trajectory) -> Table:
     A contact must hold at two output times in a row: at one alone, a slice may just be passing.
     """
     reach = 1e-4 * run.scenario.bottle.length
-    found = []
+    contacts = []
     for end in (BASE, -BASE):
         gap = run.scenario.r_max - run.r if end == BASE else run.r - run.scenario.r_min
         near = np.zeros((len(run.r) + 2, run.scenario.n_slices), dtype=np.int8)
@@ -225,8 +225,8 @@ def rest_intervals(run: Trajectory) -> Table:
         change = np.diff(near, axis=0).T
         slices, start = np.nonzero(change == 1)
         stop = np.nonzero(change == -1)[1] - 1
-        found.append(np.stack([slices, np.full(len(slices), end), start, stop])[:, stop > start])
-    slices, ends, start, stop = np.concatenate(found, axis=1)
+        contacts.append(np.stack([slices, np.full(len(slices), end), start, stop])[:, stop > start])
+    slices, ends, start, stop = np.concatenate(contacts, axis=1)
     columns = [slices, ends, run.t[start], run.t[stop]]
     return np.rec.fromarrays(columns, formats="i8,i8,f8,f8", names="slice,end,start,stop")
 

@@ -29,9 +29,9 @@ def study(ask: Ask) -> Study[Certificates]:
     )
 
 
-def claims(found: Certificates) -> Claims:
+def claims(results: Certificates) -> Claims:
     """Yield what every engine says of its own run: how far omega(t) may be off at the settings it was certified for."""
-    for name, certificate in found.certificates.items():
+    for name, certificate in results.certificates.items():
         settings, order = certificate["settings"], certificate["order"]
         words = [f"Δt = {settings['step']:.3g} s" if settings.get("step") else "no step was completed"]
         if settings.get("iterations") is not None:

@@ -51,17 +51,17 @@ EQ8_FREE: Final = "Eq. 8 to free flight"
 
 def ladder_pairs(models: Mapping[str, Model]) -> tuple[tuple[str, str, str], ...]:
     """Return (assumption, first, second) for every two models of which the second mends that one assumption more."""
-    ladder, found = ladder_of(models), []
+    ladder, pairs = ladder_of(models), []
     for first in ladder:
         before = models[first].switches
         for switch, assumption in NAMES.items():
             if not getattr(before, switch):
                 after = replace(before, **{switch: True})
-                found += [(assumption, first, second) for second in ladder if models[second].switches == after]
-    often = Counter(assumption for assumption, *_ in found)
+                pairs += [(assumption, first, second) for second in ladder if models[second].switches == after]
+    often = Counter(assumption for assumption, *_ in pairs)
     return tuple(
         (assumption if often[assumption] == 1 else f"{assumption} ({first} to {second})", first, second)
-        for assumption, first, second in found
+        for assumption, first, second in pairs
     )
 
 
@@ -163,27 +163,27 @@ def run_bands(runs: Mapping[str, Run], calls: Mapping[str, Call], flights: Fligh
     band is zero. For a model it is that of its twins, for an engine that of its certificate.
     """
     bands = dict.fromkeys(SCHEMES, 0.0)
-    for model, found in known({model: attempt(flights.answer, call) for model, call in calls.items()}).items():
-        bands[model] = float(found[-1])
+    for model, result in known({model: attempt(flights.answer, call) for model, call in calls.items()}).items():
+        bands[model] = float(result[-1])
     flown = flights.trajectories(runs)
     certified = {name: flown[name].diagnostics.get("certificate", {}) for name in WITNESSES if name in flown}
     return bands | {name: each["band"] for name, each in certified.items() if each.get("band") is not None}
 
 
-def claims(found: Differences) -> Claims:
+def claims(results: Differences) -> Claims:
     """Yield the largest difference of every pair: an observation with a band and a moment, and no share."""
-    for d in found.pairs:
-        if d.second in found.guests:
-            yield from claim_guest(d, *found.guests[d.second])
+    for d in results.pairs:
+        if d.second in results.guests:
+            yield from claim_guest(d, *results.guests[d.second])
             continue
         more = "" if d.finer is None else f"; {d.finer[1]:.3g} at N = {d.finer[0]}"
         note = f"largest difference of this pair, at t = {d.largest_time * 1e3:.1f} ms, N = {d.slices}{more}"
         id_, title = _id(d.first, d.second), f"{d.name}: {d.first} against {d.second}"
         rule: Rule = "twins and refinement" if {d.first, d.second} & set(WITNESSES) else "twins"
         yield observed(id_, title, d.largest, "of ω₀", f"{note}; {d.moment}", band=Band.of(d.band, rule))
-    for (name, first, second), reason in found.missing.items():
-        if second in found.guests:
-            yield Absent(f"guest-{found.guests[second][0].slug}-flight", name, reason)
+    for (name, first, second), reason in results.missing.items():
+        if second in results.guests:
+            yield Absent(f"guest-{results.guests[second][0].slug}-flight", name, reason)
         else:
             yield Absent(_id(first, second), name, reason, "observation")
 
@@ -205,12 +205,12 @@ def _id(first: str, second: str) -> str:
     return f"difference-{first}-{second}".replace(" ", "-")
 
 
-def figures(found: Differences) -> Iterator[Exhibit]:
+def figures(results: Differences) -> Iterator[Exhibit]:
     """Yield the differences over time."""
-    if not found.pairs:
+    if not results.pairs:
         return
-    curves = {d.name: (d.t, d.omega) for d in found.pairs}
-    words = "; ".join(f"{d.name}: at most {d.largest:.2g} of omega_0, {d.moment}" for d in found.pairs)
+    curves = {d.name: (d.t, d.omega) for d in results.pairs}
+    words = "; ".join(f"{d.name}: at most {d.largest:.2g} of omega_0, {d.moment}" for d in results.pairs)
     yield Exhibit(
         name="differences",
         title="Where the solvers part",
@@ -220,7 +220,7 @@ def figures(found: Differences) -> Iterator[Exhibit]:
         "free flight: such shares stand in the waterfall.",
         alt=f"Logarithmic line plots of the differences in omega, one panel a pair. {words}.".replace("ω₀", "omega_0"),
         maker=draw,
-        data=(found.pairs,),
+        data=(results.pairs,),
         table=curves_csv({f"difference in omega/omega_0: {name} [1]": curve for name, curve in curves.items()}),
         touch=Touch(
             label="|difference in ω| / ω₀ [1]",
@@ -259,7 +259,7 @@ def draw(differences: Sequence[Difference]) -> Figure:
     return figure
 
 
-def summary(found: Differences) -> dict[str, Any]:
+def summary(results: Differences) -> dict[str, Any]:
     """Return the numbers of every pair."""
     names = ("name", "first", "second", "largest", "largest_time", "final", "parting_time", "band", "slices")
     return {
@@ -270,7 +270,7 @@ def summary(found: Differences) -> dict[str, Any]:
                 "parting_band": PARTING_BAND,
                 "parting_impact": None if d.parting_impact is None else asdict(d.parting_impact),
             }
-            for d in found.pairs
+            for d in results.pairs
         ]
     }
 

@@ -30,7 +30,7 @@ def study(ask: Ask) -> Study[Energy]:
     )
 
 
-def claims(found: Energy) -> Claims:
+def claims(results: Energy) -> Claims:
     """Yield that the works of all forces and the losses in impacts add up, on the paper's own throw, to the change."""
 
     def closes(id_: str, title: str, run: Trajectory) -> Finding:
@@ -38,10 +38,10 @@ def claims(found: Energy) -> Claims:
         missed = abs(float(ledger["residual"]) / float(ledger["initial"]))
         return regression(id_, title, missed, "of the initial energy", (0.0, 1e-9))
 
-    for model, made in found.checks.items():
+    for model, made in results.checks.items():
         id_, title = f"energy-{model}", f"{model}: the energy ledger closes"
         yield judged(closes, id_, title, made, id=id_, title=title)
-    for model, each in found.ledgers.items():
+    for model, each in results.ledgers.items():
         if each.found is None:
             yield Absent(f"ledger-{model}", f"ledger of {model}", each.reason, "observation")
 

@@ -50,7 +50,7 @@ class EngineFact:
     admissible: tuple[float, float]
     measure: Callable[[Mapping[str, Made]], tuple[float, str]]
 
-    def found(self, made: Mapping[str, Made]) -> Finding:
+    def finding(self, made: Mapping[str, Made]) -> Finding:
         """Return the finding: that the number lies in its interval, or why there is none.
 
         A fact about an engine that is not installed and need not be cannot fail.
@@ -320,12 +320,12 @@ def study(ask: Ask) -> Study[EngineFacts]:
     made = {words: flights[run] for words, run in runs.items()}
     title = f"{ENGINE}: free flight is the same with g = 0"
     gravity = judged(claim_gravity_cancels, *(flights[run] for run in both), id="engine-gravity", title=title)
-    return gravity, tuple(fact.found(made) for fact in FACTS)
+    return gravity, tuple(fact.finding(made) for fact in FACTS)
 
 
-def claims(found: EngineFacts) -> Claims:
+def claims(results: EngineFacts) -> Claims:
     """Yield that gravity cancels, and every fact."""
-    gravity, facts = found
+    gravity, facts = results
     yield from (gravity, *facts)
 
 
@@ -337,9 +337,9 @@ def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Find
     return claim_change("engine-gravity", title, with_gravity, without, 1e-9, differ=differ, note=note)
 
 
-def figures(found: EngineFacts) -> Iterator[Exhibit]:
+def figures(results: EngineFacts) -> Iterator[Exhibit]:
     """Yield the table of facts, each with its number and threshold in the unit of its row."""
-    _, findings = found
+    _, findings = results
     words = " ".join(
         f"{finding.title}: {finding.value_text}, threshold {finding.threshold_text}, {finding.verdict}."
         for finding in findings

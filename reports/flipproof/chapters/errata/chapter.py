@@ -55,13 +55,13 @@ def study_errata(throw: Scenario) -> dict[str, Erratum]:
         except ScenarioError as error:
             raise Missing(f"ScenarioError: {error}") from error
 
-    found = {id_: attempt(evaluate, item) for id_, item in AUDIT.items()}
-    return {id_: each.found or Erratum(note=each.reason) for id_, each in found.items()}
+    errata = {id_: attempt(evaluate, item) for id_, item in AUDIT.items()}
+    return {id_: each.found or Erratum(note=each.reason) for id_, each in errata.items()}
 
 
-def claims(found: Mapping[str, Erratum]) -> Claims:
+def claims(results: Mapping[str, Erratum]) -> Claims:
     """Yield what the paper prints against what follows from its own earlier equations."""
-    for id_, erratum in found.items():
+    for id_, erratum in results.items():
         value = finite_or_none(erratum.number.value)
         band = None if value is None else abs(value) * (ROUND_OFF[1] - 1.0)
         note = f"prints {erratum.prints}; follows {erratum.follows}" + (f"; {erratum.note}" if erratum.note else "")

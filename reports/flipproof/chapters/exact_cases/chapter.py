@@ -10,11 +10,11 @@ import numpy as np
 
 from flipproof.frame.chapter import Ask, Call, Chapter, Claims, Finding, Outcome, Study, attempt, judged, regression
 
-Found = Mapping[str, Outcome[Mapping[str, float]]]
+Results = Mapping[str, Outcome[Mapping[str, float]]]
 """Model -> error by case."""
 
 
-def study(ask: Ask) -> Study[Found]:
+def study(ask: Ask) -> Study[Results]:
     """Have workers hold each model of ``ask.work`` against the exact cases."""
     calls = {model: Call(errors_of, (model,), f"exact cases of {model}") for model in ask.work}
     flights = yield list(calls.values())
@@ -36,9 +36,9 @@ def errors_of(model: str) -> dict[str, float]:
     return errors
 
 
-def claims(found: Found) -> Claims:
+def claims(results: Results) -> Claims:
     """Yield the largest error of every model."""
-    for model, each in found.items():
+    for model, each in results.items():
         yield judged(claim_exact_cases, model, each, id=f"exact-cases-{model}", title=f"exact cases of {model}")
 
 

@@ -85,8 +85,8 @@ def study(ask: Ask) -> Study[StepCosts]:
     bands = known({truth: attempt(flights.answer, call) for truth, call in calls.items()})
 
     def costs(of: dict[Way, tuple[Run, Run]]) -> tuple[StepCost, ...]:
-        found = ((cost_of(way, flights[run].whole, flights[truth].whole), truth) for way, (run, truth) in of.items())
-        return tuple(replace(cost, band=float(bands[truth][-1]) if truth in bands else None) for cost, truth in found)
+        pairs = ((cost_of(way, flights[run].whole, flights[truth].whole), truth) for way, (run, truth) in of.items())
+        return tuple(replace(cost, band=float(bands[truth][-1]) if truth in bands else None) for cost, truth in pairs)
 
     return StepCosts(costs(pairs), attempt(costs, more).found or (), ask.throw.n_slices)
 
@@ -101,9 +101,9 @@ def cost_of(way: Way, run: Trajectory, reference: Trajectory) -> StepCost:
     return StepCost(way=way, steps=len(run.t), start=start, first_impact=first, flight=float(error.max()))
 
 
-def claims(found: StepCosts) -> Claims:
+def claims(results: StepCosts) -> Claims:
     """Yield what every way costs, against the equation that it converges to; its band is that of the equation."""
-    for cost in found.costs:
+    for cost in results.costs:
         start = f"{cost.start:.2g} of ω₀ before the first impact"
         note = f"{cost.steps} steps; {'no slice strikes an end' if math.isnan(cost.start) else start}"
         title = f"{cost.way.words}: largest difference in ω from {cost.way.model}"

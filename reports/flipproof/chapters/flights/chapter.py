@@ -91,12 +91,12 @@ def solver_row(name: str, made: Made) -> dict[str, Any]:
     }
 
 
-def figures(found: Flown) -> Iterator[Exhibit]:
+def figures(results: Flown) -> Iterator[Exhibit]:
     """Yield omega, theta, the centre of mass and a few slices over time."""
-    flights = found.drawn
+    flights = results.drawn
     if not flights:
         return
-    length = found.throw.bottle.length
+    length = results.throw.bottle.length
     yield _over_time(
         flights,
         "omega",
@@ -243,7 +243,7 @@ CHAPTER: Final = Chapter(
     title="The flights",
     study=study,
     figures=figures,
-    page=lambda found: {"rows": found.rows, "drawn": found.shown, "tables": found.tables},
-    summary=lambda found: {"solvers": found.rows},
-    tables=lambda found: {file: trajectory_csv(found.made[name].flight) for name, file in found.tables.items()},
+    page=lambda results: {"rows": results.rows, "drawn": results.shown, "tables": results.tables},
+    summary=lambda results: {"solvers": results.rows},
+    tables=lambda results: {file: trajectory_csv(results.made[name].flight) for name, file in results.tables.items()},
 )

@@ -137,14 +137,14 @@ def study(ask: Ask) -> Study[Frozen]:
     return study_frozen(flights[run].flight, flights[reference].flight)
 
 
-def figures(found: Frozen) -> Iterator[Exhibit]:
+def figures(results: Frozen) -> Iterator[Exhibit]:
     """Yield changes, defects and what they add up to."""
     words = dict(zip(QUANTITIES, ("omega", "theta", "r_CM", "v_CM"), strict=True))
-    shares = ", ".join(f"{words[name]} {found.share[name]:.0%}" for name in QUANTITIES)
+    shares = ", ".join(f"{words[name]} {results.share[name]:.0%}" for name in QUANTITIES)
     peaks = ", ".join(
         f"{words[name]} {peak:.1e} m/s at {time * 1e3:.0f} ms"
-        for name, (time, peak) in found.peak.items()
-        if found.defect[name].any()
+        for name, (time, peak) in results.peak.items()
+        if results.defect[name].any()
     )
     explained = " Before the first impact the error of the velocity is {:.2f} of what they add up to."
     changes = ("|d omega|/omega per step [1]", "|d theta| per step [rad]", "|d r_CM|/L per step [1]", "gamma/omega [1]")
@@ -155,20 +155,20 @@ def figures(found: Frozen) -> Iterator[Exhibit]:
         "holding it constant misses in that step, with a marker at the largest value of each; v_CM jumps at every "
         "impact, so that a band shows the range of what holding it misses. Bottom: the missed velocities added up, "
         "beside the error of the velocity and of ω that they lead to."
-        + ("" if found.explained is None else explained.format(found.explained)),
-        alt=f"Curves over time for exact-step at a step of {found.dt * 1e3:.2g} ms. Share of the steps in which "
+        + ("" if results.explained is None else explained.format(results.explained)),
+        alt=f"Curves over time for exact-step at a step of {results.dt * 1e3:.2g} ms. Share of the steps in which "
         f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "
-        f"omega over omega_0 against eq8: {found.omega_error.max():.2g}.",
+        f"omega over omega_0 against eq8: {results.omega_error.max():.2g}.",
         maker=figure_frozen,
-        data=(found,),
+        data=(results,),
         table=columns_csv(
             {
-                TIME: found.t,
-                **dict(zip(changes, found.changes, strict=True)),
-                **{f"defect of a frozen {quantity} per step [m/s]": found.defect[quantity] for quantity in QUANTITIES},
-                "defects added up to the end of the step [m/s]": found.cumulative,
-                "error of r' there [m/s]": found.velocity_error,
-                "error of omega/omega_0 there [1]": found.omega_error,
+                TIME: results.t,
+                **dict(zip(changes, results.changes, strict=True)),
+                **{f"defect of a frozen {name} per step [m/s]": results.defect[name] for name in QUANTITIES},
+                "defects added up to the end of the step [m/s]": results.cumulative,
+                "error of r' there [m/s]": results.velocity_error,
+                "error of omega/omega_0 there [1]": results.omega_error,
             }
         ),
     )

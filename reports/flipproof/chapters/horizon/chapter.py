@@ -165,13 +165,13 @@ def study_horizon(plan: Mapping[str, Sequence[Level]], made: Mapping[Run, Made])
     def measured(level: Level) -> Ensemble:
         return study_ensemble(level.kind, level.size, [made[run].flight for run in level.runs])
 
-    found = []
+    horizons = []
     for solver, levels in plan.items():
         tried = [attempt(measured, level) for level in levels]
         problems = dict.fromkeys(each.reason for each in tried if each.reason)
         ensembles = tuple(each.found for each in tried if each.found is not None)
-        found.append(Horizon(solver=solver, ensembles=ensembles, problems=tuple(problems)))
-    return tuple(found)
+        horizons.append(Horizon(solver=solver, ensembles=ensembles, problems=tuple(problems)))
+    return tuple(horizons)
 
 
 def study_ensemble(kind: Kind, size: float, members: Sequence[Trajectory]) -> Ensemble:
@@ -194,9 +194,9 @@ def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
     return study_horizon(plan, flights)
 
 
-def claims(found: tuple[Horizon, ...]) -> Claims:
+def claims(results: tuple[Horizon, ...]) -> Claims:
     """Yield the widest ensemble of every solver, of other angles, and of other orders if the solver has an order."""
-    for horizon in found:
+    for horizon in results:
         yield claim_horizon(horizon)
         yield claim_angle(horizon)
         if (order := horizon.widest("order")) is not None:
@@ -228,14 +228,14 @@ def claim_angle(study: Horizon) -> Finding:
     return regression(name, title, value, "of ω₀", (0.0, HORIZON_BAND / 1000), note)
 
 
-def figures(found: tuple[Horizon, ...]) -> Iterator[Exhibit]:
+def figures(results: tuple[Horizon, ...]) -> Iterator[Exhibit]:
     """Yield the widths of the ensembles over time."""
-    if not any(study.ensembles for study in found):
+    if not any(study.ensembles for study in results):
         return
-    cuts = " or ".join(sorted({f"N = {each.slices}" for study in found for each in study.ensembles}))
-    words = " ".join(study.words for study in found).replace("ω₀", "omega_0").replace("θ₀", "theta_0")
+    cuts = " or ".join(sorted({f"N = {each.slices}" for study in results for each in study.ensembles}))
+    words = " ".join(study.words for study in results).replace("ω₀", "omega_0").replace("θ₀", "theta_0")
     numbers = []
-    for study in found:
+    for study in results:
         when = "" if study.horizon is None else f", beyond the band first at {study.horizon * 1e3:.0f} ms"
         widest = study.widest()
         numbers.append(f"{study.solver} " + (f"at most {widest.largest:.1g} of ω₀{when}" if widest else "was not run"))
@@ -250,11 +250,11 @@ def figures(found: tuple[Horizon, ...]) -> Iterator[Exhibit]:
         f"Widest ensemble: {'; '.join(numbers)}.",
         alt=f"Logarithmic plots of the width of ensembles over time. {words}",
         maker=figure_horizon,
-        data=(found,),
+        data=(results,),
         table=curves_csv(
             {
                 f"width of omega/omega_0 {study.solver}, {each.what} [1]": (each.t, each.width)
-                for study in found
+                for study in results
                 for each in study.ensembles
             }
         ),

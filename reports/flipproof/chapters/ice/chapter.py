@@ -88,16 +88,16 @@ def measure(label: str, run: Trajectory) -> Drift:
     return Drift(label, run.t, np.abs(run.omega / run.scenario.omega0 - 1.0))
 
 
-def claims(found: Ice) -> Claims:
+def claims(results: Ice) -> Claims:
     """Yield that every solver keeps omega, and that welded masses drift at the engine's printed order."""
-    for label, made in found.rigid.items():
+    for label, made in results.rigid.items():
         id_, title = f"ice-{label.replace(' ', '-')}", f"ice: {label} keeps ω constant"
         yield judged(claim_ice, id_, title, made, id=id_, title=title)
-    if found.welded:
+    if results.welded:
         title = "drift of welded ice"
-        yield judged(claim_welded_order, *found.welded.values(), id="ice-welded-order", title=title)
-    for label, made in found.guests.items():
-        id_, title = f"guest-{found.slugs[label]}-ice", f"{label}: drift of ω in ice on this throw"
+        yield judged(claim_welded_order, *results.welded.values(), id="ice-welded-order", title=title)
+    for label, made in results.guests.items():
+        id_, title = f"guest-{results.slugs[label]}-ice", f"{label}: drift of ω in ice on this throw"
         yield judged(observe_ice, id_, title, made, id=id_, title=title)
 
 
@@ -122,9 +122,9 @@ def claim_welded_order(*runs: Trajectory) -> Finding:
     return regression("ice-welded-order", title, order, "", (printed - 0.3, printed + 0.3), note)
 
 
-def figures(found: Ice) -> Iterator[Exhibit]:
+def figures(results: Ice) -> Iterator[Exhibit]:
     """Yield the drifts over time."""
-    runs = {**found.rigid, **found.welded, **found.guests}
+    runs = {**results.rigid, **results.welded, **results.guests}
     drifts = [measure(label, made.flight) for label, made in runs.items() if made.trajectory is not None]
     if not drifts:
         return

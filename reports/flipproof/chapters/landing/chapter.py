@@ -9,7 +9,18 @@ from itertools import accumulate, groupby
 from typing import Any, Final
 
 from flipproof.chapters.landing.figures import figures, page, witnesses
-from flipproof.chapters.landing.study import KINDS, OPTIMAL, WATER, Cases, Cell, Found, Size, aiming, counting, read
+from flipproof.chapters.landing.study import (
+    KINDS,
+    OPTIMAL,
+    WATER,
+    Cases,
+    Cell,
+    LandingStudy,
+    Size,
+    aiming,
+    counting,
+    read,
+)
 from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
 from flipproof.frame.findings import Band, Finding, observed, regression
 from flipproof.frame.solvers import REFERENCE
@@ -17,7 +28,7 @@ from flipproof.landing.design import Case, make_cases
 from flipproof.landing.work import Landed
 
 
-def study(ask: Ask) -> Study[Found]:
+def study(ask: Ask) -> Study[LandingStudy]:
     """Solve for the aims, throw about them, and throw about the best of them, a wave each."""
     planned = Call(aiming, (ask.throw, ask.work), "aims of the landing")
     flights = yield [planned]
@@ -46,36 +57,36 @@ def chunks(cases: Sequence[Case]) -> list[tuple[Case, ...]]:
     return [tuple(case for case, _ in some) for _, some in groups]
 
 
-def claims(found: Found) -> Iterator[Finding]:
+def claims(results: LandingStudy) -> Iterator[Finding]:
     """Yield every finding of the subject."""
-    yield from _water_and_ice(found)
-    yield _best_filling(found)
-    yield from _static(found)
-    yield _bounces(found)
-    yield _model_uncertainty(found)
-    yield _undecided(found)
+    yield from _water_and_ice(results)
+    yield _best_filling(results)
+    yield from _static(results)
+    yield _bounces(results)
+    yield _model_uncertainty(results)
+    yield _undecided(results)
     yield from _witnesses(witnesses())
 
 
-def _water_and_ice(found: Found) -> Iterator[Finding]:
+def _water_and_ice(results: LandingStudy) -> Iterator[Finding]:
     """Yield P(water) - P(ice) for every filling, as far as both were thrown."""
-    for filling, water in found.along("filling", "together"):
-        ice = found.cell("ice", filling)
+    for filling, water in results.along("filling", "together"):
+        ice = results.cell("ice", filling)
         if ice is None:
             continue
         difference, low, high = water.minus(ice)
-        others = {KINDS[kind].words: found.cell(kind, filling) for kind in WATER[1:]}
+        others = {KINDS[kind].words: results.cell(kind, filling) for kind in WATER[1:]}
         laws = ", ".join(f"{law} {cell.share.value:.3f}" for law, cell in others.items() if cell is not None)
         verdict = _judged(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
         title = f"P(upright) of water minus ice at filling {filling:g} (abstract, section 3: redistribution helps)"
-        note = f"{verdict}; law together; {laws}; {found.assumed}"
+        note = f"{verdict}; law together; {laws}; {results.assumed}"
         band = Band((high - low) / 2, "sample")
         yield observed(f"landing-water-minus-ice-{filling:g}", title, difference, "", note, band=band)
 
 
-def _best_filling(found: Found) -> Finding:
+def _best_filling(results: LandingStudy) -> Finding:
     """Return where P(water) is largest: the paper's optimum is 0.2 to 0.5 (section 5)."""
-    curve = found.along("filling", "together")
+    curve = results.along("filling", "together")
     inside = [pair for pair in curve if OPTIMAL[0] <= pair[0] <= OPTIMAL[1]]
     outside = [pair for pair in curve if pair not in inside]
     name, title = "landing-best-filling", "Filling at which water stands most often (section 5: 0.2 to 0.5)"
@@ -90,64 +101,64 @@ def _best_filling(found: Found) -> Finding:
     note = (
         f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; "
         f"difference {difference:+.3f}, {_judged(low, high, ('decided', 'decided', 'not decided'))}; the interval "
-        f"holds for fillings named beforehand, and these two were chosen by the throws it is made of; {found.assumed}"
+        f"holds for fillings named beforehand, and these two were chosen by the throws it is made of; {results.assumed}"
     )
     return observed(name, title, max(curve, key=share)[0], note=note)
 
 
-def _static(found: Found) -> Iterator[Finding]:
+def _static(results: LandingStudy) -> Iterator[Finding]:
     """Yield how often the static criterion says the outcome rightly (section 6, Eq. 13a)."""
     title = "Throws of which the toppling angle at the touch says rightly whether they stand: "
-    for (family, kind), (said, others) in found.static.items():
+    for (family, kind), (said, others) in results.static.items():
         if throws := said.throws + others.throws:
             id_ = f"landing-static-{family}-{kind.replace(', ', '-')}"
             words = f"{title}{KINDS[kind].words}, family {family}"
             note = f"of those with a tilt below it {said.upright} of {said.throws} stand, of those above it "
-            note += f"{others.upright} of {others.throws}; {found.assumed}"
+            note += f"{others.upright} of {others.throws}; {results.assumed}"
             yield observed(id_, words, (said.upright + others.throws - others.upright) / throws, note=note)
 
 
-def _bounces(found: Found) -> Finding:
+def _bounces(results: LandingStudy) -> Finding:
     """Return whether falling water dampens the bounce (section 6)."""
-    name, filling = "landing-bounces", found.size.axis_filling
+    name, filling = "landing-bounces", results.size.axis_filling
     title = f"Bounces of ice minus bounces of water at filling {filling:g} (section 6: falling water dampens them)"
-    water, ice = found.cell("together", filling), found.cell("ice", filling)
+    water, ice = results.cell("together", filling), results.cell("ice", filling)
     if water is None or ice is None:
         return observed(name, title, None, note="water or ice was not thrown at this filling")
     difference, band = ice.bounces - water.bounces, math.hypot(ice.bounces_band, water.bounces_band)
     words = _judged(difference - band, difference + band, digits=2)
-    note = f"until the outcome is certain; ice {ice.bounces:.2f}, water {water.bounces:.2f}; {words}; {found.assumed}"
+    note = f"until the outcome is certain; ice {ice.bounces:.2f}, water {water.bounces:.2f}; {words}; {results.assumed}"
     return observed(name, title, difference, "bounces", note, band=Band(band, "sample"))
 
 
-def _model_uncertainty(found: Found) -> Finding:
+def _model_uncertainty(results: LandingStudy) -> Finding:
     """Return how far the laws of the impact are apart: a band of the model, not of the sample."""
     name, title = "landing-laws", "Largest distance in P(upright) between two laws of the impact, water"
     pairs = [
         (one.minus(other), f"at filling {filling:g}, {KINDS[first].words} minus {KINDS[second].words}")
-        for filling in found.size.fillings
+        for filling in results.size.fillings
         for first, second in itertools.permutations(WATER, 2)
-        if (one := found.cell(first, filling)) and (other := found.cell(second, filling))
+        if (one := results.cell(first, filling)) and (other := results.cell(second, filling))
     ]
     if not pairs:
         return observed(name, title, None, note="one law only")
     (widest, low, high), where = max(pairs)
     note = (
         f"{where}; 95 % interval of this pair alone {low:+.3f} to {high:+.3f}; the laws are models of one impact and "
-        f"are not averaged; {found.assumed}"
+        f"are not averaged; {results.assumed}"
     )
     return observed(name, title, widest, note=note, band=Band((high - low) / 2, "sample"))
 
 
-def _undecided(found: Found) -> Finding:
+def _undecided(results: LandingStudy) -> Finding:
     """Return how many landings of the reference could not be certified; a regression of the paper's throw alone."""
     name, title = "landing-undecided", "Landings of the reference that no certificate decides"
-    shares = [cell.share for key, cell in found.cells.items() if key.kind in ("together", "in-turn", "ice")]
+    shares = [cell.share for key, cell in results.cells.items() if key.kind in ("together", "in-turn", "ice")]
     throws, unknown = sum(share.throws for share in shares), sum(share.undecided for share in shares)
     if not throws:
         return observed(name, title, None, note="nothing was thrown")
     note = f"{unknown} of {throws}; they count both ways in every interval"
-    if found.throw.with_slices(REFERENCE.n_slices) != REFERENCE:
+    if results.throw.with_slices(REFERENCE.n_slices) != REFERENCE:
         return observed(name, title, unknown / throws, note=note)
     return regression(name, title, unknown / throws, "", (0.0, 0.01), note)
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Found, Kind
+from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Kind, LandingStudy
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.exhibit import Exhibit
 from flipproof.landing.design import FAMILIES
@@ -39,14 +39,14 @@ def witnesses() -> Mapping[str, Any]:
     return dict(json.loads(text))
 
 
-def figures(found: Found) -> list[Exhibit]:
+def figures(results: LandingStudy) -> list[Exhibit]:
     """Return every figure of the subject."""
-    size = found.size
+    size = results.size
     missed = "In family A ice that does not reach the table from above counts as not upright. "
 
     def exhibit(name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], table: str) -> Exhibit:
-        caption = f"{caption} {found.assumed.capitalize()}."
-        return Exhibit(name=name, title=title, caption=caption, alt=alt, maker=maker, data=(found,), table=table)
+        caption = f"{caption} {results.assumed.capitalize()}."
+        return Exhibit(name=name, title=title, caption=caption, alt=alt, maker=maker, data=(results,), table=table)
 
     return [
         exhibit(
@@ -55,9 +55,9 @@ def figures(found: Found) -> list[Exhibit]:
             f"Share of throws that end upright, {size.throws} throws a point, with Wilson's 95 % interval. "
             "The laws of the impact are models of one landing and are not averaged. The shaded fillings are those "
             f"that the paper calls optimal. {missed if 'A' in size.families else ''}".rstrip(),
-            " ".join(share_line(found, family).replace("\n ", " ") + "." for family in size.families),
+            " ".join(share_line(results, family).replace("\n ", " ") + "." for family in size.families),
             figure_shares,
-            shares_csv(found),
+            shares_csv(results),
         ),
         exhibit(
             "landing-map",
@@ -67,10 +67,10 @@ def figures(found: Found) -> list[Exhibit]:
             "the table together.",
             ", ".join(
                 f"{kind}: {int((each.outcome == 'upright').sum())} of {each.outcome.size} cells upright"
-                for kind, each in found.maps.items()
+                for kind, each in results.maps.items()
             ),
             figure_map,
-            map_csv(found),
+            map_csv(results),
         ),
         exhibit(
             "landing-axes",
@@ -79,11 +79,11 @@ def figures(found: Found) -> list[Exhibit]:
             f"others as they are; {size.axis_throws} throws a point, the same along an axis. Each axis has its own.",
             "; ".join(
                 f"P(upright) of water along {axis}: "
-                + ", ".join(f"{value:g}: {cell.share.value:.2f}" for value, cell in found.along(axis, "together"))
+                + ", ".join(f"{value:g}: {cell.share.value:.2f}" for value, cell in results.along(axis, "together"))
                 for axis in ("restitution", "friction", "scatter")
             ),
             figure_axes,
-            shares_csv(found),
+            shares_csv(results),
         ),
         exhibit(
             "landing-static",
@@ -94,28 +94,28 @@ def figures(found: Found) -> list[Exhibit]:
             "; ".join(
                 f"family {family}, {kind}: {said.upright} of {said.throws} called upright stand, {others.upright} of "
                 f"{others.throws} others"
-                for (family, kind), (said, others) in found.static.items()
+                for (family, kind), (said, others) in results.static.items()
             ),
             figure_static,
-            static_csv(found),
+            static_csv(results),
         ),
         exhibit(
             "landing-energy",
             "Energy against the saddle",
             f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the energy does "
             "not suffice to get from the base over a rim, and the outcome is final.",
-            _energy_words(found),
+            _energy_words(results),
             figure_energy,
-            energies_csv(found),
+            energies_csv(results),
         ),
         _witness_figure(witnesses()),
     ]
 
 
-def _energy_words(found: Found) -> str:
+def _energy_words(results: LandingStudy) -> str:
     words = []
     for kind in WATER_AND_ICE:
-        runs = [run for run in found.energies if run.kind == kind]
+        runs = [run for run in results.energies if run.kind == kind]
         if runs:
             start = sum(float(run.energy[0]) for run in runs) / len(runs)
             stand = sum(run.outcome == "upright" for run in runs)
@@ -145,12 +145,12 @@ def _witness_figure(stored: Mapping[str, Any]) -> Exhibit:
 
 
 @styled
-def figure_shares(found: Found) -> Figure:
+def figure_shares(results: LandingStudy) -> Figure:
     """P(upright) over the filling with 95 % intervals, a panel a family."""
-    figure, panels = new_figure(1, len(found.size.families), size=(8.6, 4.4), squeeze=False, sharey=True)
-    for axes, family in zip(panels[0], found.size.families, strict=True):
+    figure, panels = new_figure(1, len(results.size.families), size=(8.6, 4.4), squeeze=False, sharey=True)
+    for axes, family in zip(panels[0], results.size.families, strict=True):
         for kind in LOOKS:
-            _curve(axes, kind, found.along("filling", kind, family))
+            _curve(axes, kind, results.along("filling", kind, family))
         axes.axvspan(*OPTIMAL, color="#0072B2", alpha=0.06, linewidth=0)
         axes.set_title(f"{family}: {FAMILIES[family]}", fontsize=10, loc="left")
         axes.set(xlabel="fill fraction M_w / M_max [1]", ylim=(0.0, 1.0))
@@ -160,16 +160,16 @@ def figure_shares(found: Found) -> Figure:
 
 
 @styled
-def figure_axes(found: Found) -> Figure:
+def figure_axes(results: LandingStudy) -> Figure:
     """P(upright) along what is assumed: restitution and friction of the table, scatter of the thrower."""
     names = {"restitution": "e_table [1]", "friction": "friction of the table [1]", "scatter": "scatter, times assumed"}
     figure, panels = new_figure(1, 3, size=(8.6, 3.8), sharey=True)
     for axes, (axis, label) in zip(panels, names.items(), strict=True):
         for kind in AXIS_KINDS:
-            _curve(axes, kind, found.along(axis, kind))
+            _curve(axes, kind, results.along(axis, kind))
         axes.set(xlabel=label, ylim=(0.0, 1.0))
     panels[0].set_ylabel("P(upright) [1]")
-    title = f"filling {found.size.axis_filling:g}, family {found.size.families[-1]}"
+    title = f"filling {results.size.axis_filling:g}, family {results.size.families[-1]}"
     panels[0].set_title(title, fontsize=10, loc="left")
     shared_legend(figure, panels[0])
     return figure
@@ -185,15 +185,15 @@ def _curve(axes: Axes, kind: Kind, curve: Sequence[tuple[float, Cell]]) -> None:
 
 
 @styled
-def figure_map(found: Found) -> Figure:
+def figure_map(results: LandingStudy) -> Figure:
     """Outcome of one throw without scatter over filling and omega_0; lines where the bottle touches upright."""
-    figure, panels = new_figure(1, max(len(found.maps), 1), size=(8.6, 4.6), squeeze=False, sharey=True)
+    figure, panels = new_figure(1, max(len(results.maps), 1), size=(8.6, 4.6), squeeze=False, sharey=True)
     names, colours = list(SHADES), ListedColormap(list(SHADES.values()))
-    fills, omegas = found.size.map_axes
+    fills, omegas = results.size.map_axes
     # One filling is drawn as two columns alike: a single one has no width.
     columns = 2 if len(fills) == 1 else 1
     grid = (fills[0] + np.array([-0.02, 0.02]) if columns == 2 else fills), omegas
-    for axes, (kind, outcomes) in zip(panels[0], found.maps.items(), strict=False):
+    for axes, (kind, outcomes) in zip(panels[0], results.maps.items(), strict=False):
         codes = np.vectorize(lambda name: names.index(name) if name in names else len(names) - 1)(outcomes.outcome)
         codes, turns = np.repeat(codes, columns, axis=1), np.repeat(outcomes.theta / math.tau, columns, axis=1)
         ends = {"vmin": -0.5, "vmax": len(names) - 0.5}
@@ -207,7 +207,7 @@ def figure_map(found: Found) -> Figure:
             axes.set_xticks(fills)
         axes.grid(visible=False)
     panels[0, 0].set_ylabel("ω₀ [rad/s]")
-    shown = {str(name) for outcomes in found.maps.values() for name in outcomes.outcome.ravel()}
+    shown = {str(name) for outcomes in results.maps.values() for name in outcomes.outcome.ravel()}
     patches = [Patch(facecolor=SHADES[name], edgecolor="#bbbbbb", label=name) for name in names if name in shown]
     once = Line2D([], [], color="black", linestyle="-", label="touches at 360 degrees")
     twice = Line2D([], [], color="black", linestyle="--", label="at 720 degrees")
@@ -216,15 +216,15 @@ def figure_map(found: Found) -> Figure:
 
 
 @styled
-def figure_static(found: Found) -> Figure:
+def figure_static(results: LandingStudy) -> Figure:
     """Of the throws that the static criterion calls upright, and of those it does not, the share that stands."""
-    names = [name for name, (said, others) in found.static.items() if said.throws + others.throws]
+    names = [name for name, (said, others) in results.static.items() if said.throws + others.throws]
     figure, axes = new_figure(size=(8.6, 3.9))
     width = 0.38
     looks = (("#0072B2", "tilt below the toppling angle at touch"), ("#D55E00", "tilt above it"))
     for side, (colour, label) in enumerate(looks):
         for k, name in enumerate(names):
-            share = found.static[name][side]
+            share = results.static[name][side]
             height = share.upright / share.throws if share.throws else 0.0
             bar = axes.bar(k + (side - 0.5) * width, height, width, color=colour, label=label if k == 0 else None)
             axes.bar_label(bar, [f"{share.upright} of {share.throws}"], fontsize=7.5, padding=2)
@@ -235,12 +235,12 @@ def figure_static(found: Found) -> Figure:
 
 
 @styled
-def figure_energy(found: Found) -> Figure:
+def figure_energy(results: LandingStudy) -> Figure:
     """Energy of a few landings over the saddle: below 1 the outcome is final."""
     figure, panels = new_figure(1, 2, size=(8.6, 4.0), sharey=True)
     fallen = "#B08D57"
     for axes, kind in zip(panels, WATER_AND_ICE, strict=True):
-        for run in found.energies:
+        for run in results.energies:
             if run.kind == kind:
                 colour = SHADES["upright"] if run.outcome == "upright" else fallen
                 axes.plot(run.t, np.minimum(run.energy, 8.0), color=colour, linewidth=1.1, alpha=0.85)
@@ -283,7 +283,7 @@ def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
     return figure
 
 
-def shares_csv(found: Found) -> str:
+def shares_csv(results: LandingStudy) -> str:
     """Return one row for each share: what was thrown, the share with its 95 % interval, and means at the touch."""
     rows = [
         [
@@ -291,7 +291,7 @@ def shares_csv(found: Found) -> str:
             cell.share.undecided, cell.missed, cell.share.throws, cell.share.value, *cell.share.interval,
             cell.aim.throw.omega0, cell.aim.height, cell.aim.time, *cell.touch, cell.bounces,
         ]
-        for key, cell in found.cells.items()
+        for key, cell in results.cells.items()
     ]  # fmt: skip
     names = (
         "axis", "value", "family", "fill_fraction [1]", "landed", "upright", "undecided", "missed", "throws",
@@ -301,12 +301,12 @@ def shares_csv(found: Found) -> str:
     return rows_csv(names, rows, digits=None)
 
 
-def map_csv(found: Found) -> str:
+def map_csv(results: LandingStudy) -> str:
     """Return one row for each cell of the map."""
-    fillings, omegas = found.size.map_axes
+    fillings, omegas = results.size.map_axes
     rows = [
         [fill, omega0, KINDS[kind].words, outcomes.outcome[j, i], math.degrees(outcomes.theta[j, i])]
-        for kind, outcomes in found.maps.items()
+        for kind, outcomes in results.maps.items()
         for j, omega0 in enumerate(omegas.tolist())
         for i, fill in enumerate(fillings.tolist())
     ]
@@ -315,22 +315,22 @@ def map_csv(found: Found) -> str:
     )
 
 
-def static_csv(found: Found) -> str:
+def static_csv(results: LandingStudy) -> str:
     """Return how often the static criterion and the outcome agree."""
     rows = [
         [family, KINDS[kind].words, said, upright, count]
-        for (family, kind), shares in found.static.items()
+        for (family, kind), shares in results.static.items()
         for said, share in zip(("yes", "no"), shares, strict=True)
         for upright, count in (("yes", share.upright), ("no", share.throws - share.upright))
     ]
     return rows_csv(("family", "landed", "tilt below toppling angle at touch", "upright", "throws"), rows, digits=None)
 
 
-def energies_csv(found: Found) -> str:
+def energies_csv(results: LandingStudy) -> str:
     """Return the energies that are drawn."""
     rows = [
         [KINDS[run.kind].words, k, run.outcome, t, e]
-        for k, run in enumerate(found.energies)
+        for k, run in enumerate(results.energies)
         for t, e in zip(run.t.tolist(), run.energy.tolist(), strict=True)
     ]
     return rows_csv(("landed", "throw", "outcome", "t [s]", "energy [E_s]"), rows, digits=None)
@@ -349,12 +349,12 @@ def witnesses_csv(stored: Mapping[str, Any]) -> str:
     )
 
 
-def share_line(found: Found, family: str) -> str:
+def share_line(results: LandingStudy, family: str) -> str:
     """Return the shares of one family as lines."""
     lines = [f"P(upright), family {family}, 95 % intervals:"]
     for kind, landing in KINDS.items():
         words = []
-        for fill, cell in found.along("filling", kind, family):
+        for fill, cell in results.along("filling", kind, family):
             low, high = cell.share.interval
             words.append(f"{fill:g}: {cell.share.value:.3f} [{low:.3f}, {high:.3f}]")
         if words:
@@ -362,15 +362,15 @@ def share_line(found: Found, family: str) -> str:
     return "\n".join(lines)
 
 
-def page(found: Found) -> dict[str, object]:
+def page(results: LandingStudy) -> dict[str, object]:
     """Return what the chapter's template takes: a table a family, and why some throws were not made.
 
     A table is the family in words, its fillings, and for every law of the impact its cell at each, None if not thrown.
     """
     shares = []
-    for family in found.size.families:
-        curves = {landing.words: dict(found.along("filling", kind, family)) for kind, landing in KINDS.items()}
+    for family in results.size.families:
+        curves = {landing.words: dict(results.along("filling", kind, family)) for kind, landing in KINDS.items()}
         fills = sorted({fill for curve in curves.values() for fill in curve})
         rows = [(name, [curve.get(fill) for fill in fills]) for name, curve in curves.items() if curve]
         shares.append((f"family {family}: {FAMILIES[family]}", fills, rows))
-    return {"shares": shares, "unaimed": sorted(set(found.unaimed.values()))}
+    return {"shares": shares, "unaimed": sorted(set(results.unaimed.values()))}

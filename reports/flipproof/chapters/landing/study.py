@@ -165,7 +165,7 @@ class Energy:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class LandingStudy:
     """What the study found.
 
     Parameters
@@ -322,7 +322,7 @@ def share_of(rows: Sequence[Landed]) -> Share:
     return Share(upright=sum(row.outcome == "upright" for row in rows), undecided=unknown, throws=len(rows))
 
 
-def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping[Place, str]) -> Found:
+def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping[Place, str]) -> LandingStudy:
     """Return what the rows of the second wave say."""
     fillings, omegas = size.map_axes
     sorts: dict[tuple[str, Kind], tuple[list[Landed], ...]] = {}
@@ -331,10 +331,10 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
     maps: dict[Kind, Outcomes] = {}
     for (key, case), some in zip(cases.items(), rows, strict=True):
         if key.axis == "map":
-            found = maps.setdefault(key.kind, Outcomes(np.full(shape, "", "U9"), np.full(shape, np.nan)))
+            outcomes = maps.setdefault(key.kind, Outcomes(np.full(shape, "", "U9"), np.full(shape, np.nan)))
             at = omegas.tolist().index(key.value), fillings.tolist().index(key.filling)
-            found.outcome[at] = some[0].outcome or some[0].status
-            found.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
+            outcomes.outcome[at] = some[0].outcome or some[0].status
+            outcomes.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
             continue
         counted.setdefault(key._replace(cut=0), (case.aim, []))[1].extend(some)
         if key.axis == "filling":
@@ -343,7 +343,7 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
             said += [row for row in decided if (row.static_margin or 0.0) > 0.0]
             others += [row for row in decided if not (row.static_margin or 0.0) > 0.0]
     cells = {key: cell_of(aim, some) for key, (aim, some) in counted.items()}
-    return Found(
+    return LandingStudy(
         throw=throw,
         size=size,
         cells=cells,
@@ -383,9 +383,9 @@ def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
     case, some = cases[wanted], rows[list(cases).index(wanted)]
     design = Throws(cases=(case,), seed=size.seed)
     table = Table(height=case.aim.height, restitution=case.restitution, friction=case.friction)
-    found = []
+    energies = []
     for place, row in enumerate(islice(some, 10)):
         if row.outcome not in (None, "undecided"):
             run = path(fly(design.thrown(case, place), table), table, case.law, duration=0.45)
-            found.append(Energy(kind, run.t, run.energy / run.saddle, str(row.outcome)))
-    return found
+            energies.append(Energy(kind, run.t, run.energy / run.saddle, str(row.outcome)))
+    return energies

@@ -153,7 +153,7 @@ class _Fit:
         starts = [np.array([0.0, p, share * error.min()]) for p in (0.5, 1.0, 2.0) for share in (0.0, 0.3, 0.95)]
         for start in starts:
             start[0] = float(np.mean(self.log_error - start[1] * self.log_dt))
-        self.best, self.cost = min((self._minimum(start, None) for start in starts), key=lambda found: found[1])
+        self.best, self.cost = min((self._minimum(start, None) for start in starts), key=lambda best: best[1])
         self.freedom = len(dt) - 3
         self.scatter = math.sqrt(self.cost / self.freedom)
 
@@ -183,8 +183,8 @@ class _Fit:
 
         bounds = (self.low[moving] / scale[moving], self.high[moving] / scale[moving])
         inside = np.clip(start[moving] / scale[moving], *bounds)
-        found = least_squares(residuals, inside, slopes, bounds=bounds, x_scale="jac", max_nfev=400)
-        return whole(found.x), float(2.0 * found.cost)
+        result = least_squares(residuals, inside, slopes, bounds=bounds, x_scale="jac", max_nfev=400)
+        return whole(result.x), float(2.0 * result.cost)
 
     def interval(self, j: int) -> Interval:
         """Return the values of p (1) or F (2) that the data do not refuse, with the others fitted anew for each."""
@@ -280,11 +280,11 @@ FORMS: Final = (
 )
 """Scheme and equation: is what is left as the step goes to zero the step's, or another equation?"""
 
-Found = tuple[Mapping[tuple[str, str], Outcome[ModelForm]], Mapping[str, Outcome[Richardson]]]
+Results = tuple[Mapping[tuple[str, str], Outcome[ModelForm]], Mapping[str, Outcome[Richardson]]]
 """The fit of every pair of scheme and equation, and where each scheme goes as its step goes to zero."""
 
 
-def study(ask: Ask) -> Study[Found]:
+def study(ask: Ask) -> Study[Results]:
     """Halve the step of the schemes of FORMS; fit omega of the pairs that ``ask.work`` lists, in workers."""
     levels = {scheme: plan_step_size(ask.throw, scheme, base=37, multiple=54, count=6) for scheme in dict(FORMS)}
     grids = (run for each in levels.values() for level in each for run in level)
@@ -307,9 +307,9 @@ def study(ask: Ask) -> Study[Found]:
     return forms, {scheme: attempt(limit, scheme) for scheme in levels}
 
 
-def claims(found: Found) -> Claims:
+def claims(results: Results) -> Claims:
     """Yield where every scheme goes, and what stays of its error against an equation."""
-    forms, limits = found
+    forms, limits = results
     for scheme, limit in limits.items():
         id_ = f"limit-{scheme}"
         yield judged(claim_limit, id_, scheme, limit, id=id_, title=f"limit of {scheme}", kind="observation")
@@ -338,5 +338,5 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claims,
     work={"quick": FORMS[:2], "full": FORMS},
-    page=lambda found: {"fits": list(known(found[0]).items())},
+    page=lambda results: {"fits": list(known(results[0]).items())},
 )

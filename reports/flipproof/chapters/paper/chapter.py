@@ -31,9 +31,9 @@ CHAPTER: Final = Chapter(
     name="paper",
     title="The paper's figures and claims",
     study=study,
-    claims=lambda found: found.verdicts.findings(),
-    figures=lambda found: exhibits_paper(found.runs),
+    claims=lambda results: results.verdicts.findings(),
+    figures=lambda results: exhibits_paper(results.runs),
     work={"full": None},
-    summary=lambda found: {"paper": found.verdicts.to_mapping()},
-    page=lambda found: {"paper": found.verdicts},
+    summary=lambda results: {"paper": results.verdicts.to_mapping()},
+    page=lambda results: {"paper": results.verdicts},
 )

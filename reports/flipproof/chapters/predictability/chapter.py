@@ -164,10 +164,10 @@ def study_predictability(base: Trajectory, members: Sequence[Sequence[Trajectory
 
 SIZE_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (3, 1.5, 1, 1.5)), (0, (1, 1.5)))
 
-Found = Mapping[str, Outcome[Predictability]]
+Results = Mapping[str, Outcome[Predictability]]
 
 
-def study(ask: Ask) -> Study[Found]:
+def study(ask: Ask) -> Study[Results]:
     """Change the release of each solver's flight by the sizes that ``ask.work`` lists."""
     levels = {name: plan_predictability(ask.throw, name, sizes=ask.work) for name in ("eq8", "free-flight")}
     changed = [run for plans in levels.values() for level in plans for run in level]
@@ -179,21 +179,21 @@ def study(ask: Ask) -> Study[Found]:
     return {name: attempt(measured, name) for name in levels}
 
 
-def claims(found: Found) -> Claims:
+def claims(results: Results) -> Claims:
     """Yield how much the smallest change of the release is amplified, and up to when a curve means anything."""
 
     def amplification(id_: str, study: Predictability) -> Finding:
         title = f"{study.solver}: largest amplification of a change of {study.sizes[0]:.0e} of the release"
         return observed(id_, title, float(study.amplification[0]), note=study.words)
 
-    for solver, each in found.items():
+    for solver, each in results.items():
         id_, title = f"predictability-{solver}", f"predictability of {solver}"
         yield judged(amplification, id_, each, id=id_, title=title, kind="observation")
 
 
-def figures(found: Found) -> Iterator[Exhibit]:
+def figures(results: Results) -> Iterator[Exhibit]:
     """Yield the spread after every change."""
-    studies = list(known(found).values())
+    studies = list(known(results).values())
     if not studies:
         return
     words = " ".join(f"{study.words}." for study in studies)

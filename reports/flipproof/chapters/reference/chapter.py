@@ -18,11 +18,11 @@ BAND: Final = 1e-7
 CROSS_CHECKED: Final = ("published-limit", "eq8")
 """Models that a second integration method is held against."""
 
-Found = Mapping[str, list[Made]]
+Results = Mapping[str, list[Made]]
 """Model -> its flight of the paper's own throw: as it is, by the witness, and by a second method if asked for."""
 
 
-def study(ask: Ask) -> Study[Found]:
+def study(ask: Ask) -> Study[Results]:
     """Fly each model of ``ask.work`` twice; those of CROSS_CHECKED a third time by the method that stands beside."""
     (models, second), throw = ask.work, ask.reference
     runs = {}
@@ -42,9 +42,9 @@ def witnessed(scenario: Scenario, model: str) -> dict[str, Any]:
     return {"method": "DOP853", "rtol": 1e-11, "atol": 1e-14, "rest_speed": rest_speed, "max_step": longest}
 
 
-def claims(found: Found) -> Claims:
+def claims(results: Results) -> Claims:
     """Yield that every model is confirmed."""
-    for model, (usual, witness, *others) in found.items():
+    for model, (usual, witness, *others) in results.items():
         id_, title = f"reference-{model}", f"{model} is converged"
         yield judged(claim_reference_converged, usual, witness, id=id_, title=title)
         for other in others:

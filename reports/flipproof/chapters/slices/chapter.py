@@ -28,11 +28,11 @@ class SliceCount(NamedTuple):
         return [run.scenario.n_slices for run in self.trajectories]
 
 
-Found = Mapping[str, SliceCount]
+Results = Mapping[str, SliceCount]
 """The study of every scheme all of whose cuts were made."""
 
 
-def study(ask: Ask) -> Study[Found]:
+def study(ask: Ask) -> Study[Results]:
     """Throw the bottle in as many slices as ``ask.work`` lists, in increasing order."""
     runs = {
         scheme: [Run(scheme, ask.throw.with_slices(n), {"store": "summary"}, f"{scheme}, {n} slices") for n in ask.work]
@@ -52,13 +52,13 @@ def compare(runs: list[Trajectory]) -> SliceCount:
     return SliceCount(runs, apart)
 
 
-def figures(found: Found) -> Iterator[Exhibit]:
+def figures(results: Results) -> Iterator[Exhibit]:
     """Yield omega(t) at every number of slices."""
-    if not found:
+    if not results:
         return
     words = "; ".join(
         f"{scheme}: " + ", ".join(f"N = {n} {d:.2g}" for n, d in zip(s.counts, s.distance, strict=True))
-        for scheme, s in found.items()
+        for scheme, s in results.items()
     )
     yield Exhibit(
         name="slice-count",
@@ -68,11 +68,11 @@ def figures(found: Found) -> Iterator[Exhibit]:
         alt="Line plots of omega over omega_0 for several numbers of slices. Largest distance from the finest cut, of "
         f"omega_0: {words}.",
         maker=draw,
-        data=(found,),
+        data=(results,),
         table=curves_csv(
             {
                 f"omega/omega_0 {scheme} N = {n} [1]": (run.t, run.omega / run.scenario.omega0)
-                for scheme, s in found.items()
+                for scheme, s in results.items()
                 for n, run in zip(s.counts, s.trajectories, strict=True)
             }
         ),

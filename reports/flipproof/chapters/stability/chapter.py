@@ -45,11 +45,11 @@ from flipproof.frame.solvers import Made, Run
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 
-Found = tuple[tuple[StabilityPanel, ...], Made]
+Results = tuple[tuple[StabilityPanel, ...], Made]
 """The charts, and the report's throw at the engine's own number of iterations."""
 
 
-def study(ask: Ask) -> Study[Found]:
+def study(ask: Ask) -> Study[Results]:
     """Fly every cell of the layout ``ask.work``."""
     default = Run("pymunk", ask.throw, {"iterations": DEFAULT_ITERATIONS}, f"pymunk, {DEFAULT_ITERATIONS} iterations")
     calls = plan_bands(ask.reference, ask.work)
@@ -59,9 +59,9 @@ def study(ask: Ask) -> Study[Found]:
     return study_stability(ask.reference, ask.work, flights, largest), flights[default]
 
 
-def claims(found: Found) -> Claims:
+def claims(results: Results) -> Claims:
     """Yield the rule of iterations, what happens at the default, and how many runs are whole and wrong."""
-    panels, default = found
+    panels, default = results
     id_, title = "engine-default-iterations", f"pymunk with its default {DEFAULT_ITERATIONS} iterations"
     yield judged(claim_explosion_is_reported, default, id=id_, title=title, kind="observation")
     yield claim_rule_of_iterations(panels)
@@ -110,9 +110,9 @@ def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
     return observed("engine-default-iterations", title, until, "s", note)
 
 
-def figures(found: Found) -> Iterator[Exhibit]:
+def figures(results: Results) -> Iterator[Exhibit]:
     """Yield the stability chart."""
-    panels, _ = found
+    panels, _ = results
     counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in panels[0].counts}
     default = [grade for panel in panels for grade in panel.at_default]
     missing = sorted({cell.reason for panel in panels for cell in panel.cells.values() if cell.grade == "not run"})

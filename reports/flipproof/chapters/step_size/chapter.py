@@ -188,21 +188,21 @@ def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
     return [[before], *plan_step_size(start, scheme, base=9, multiple=14, count=levels)]
 
 
-def claims(found: Orders) -> Claims:
+def claims(results: Orders) -> Claims:
     """Yield the order of every scheme: a regression on the paper's own throw, an observation on the report's."""
     for scheme in SCHEMES:
         for where in CHECKED:
             id_ = f"order-{scheme}-{where.replace(' ', '-')}"
             title = f"{scheme} converges to {LIMITS[scheme]}, {where}"
-            yield judged(claim_order, found[where, scheme], where, id=id_, title=title)
+            yield judged(claim_order, results[where, scheme], where, id=id_, title=title)
         for where in (START, WHOLE):
-            if (where, scheme) in found and (measured := found[where, scheme].found) is not None:
+            if (where, scheme) in results and (measured := results[where, scheme].found) is not None:
                 yield claim_order(measured, where, kind="observation")
 
 
-def _measured(found: Orders, where: str) -> list[StepSize]:
+def _measured(results: Orders, where: str) -> list[StepSize]:
     """Return the studies of a part that could be made."""
-    return [each for (part, _), each in known(found).items() if part == where]
+    return [each for (part, _), each in known(results).items() if part == where]
 
 
 def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Finding:
@@ -223,9 +223,9 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
     return regression(id_, title, order, "", (0.9, 1.1), note, band=Band(study.order_error, "fit"))
 
 
-def figures(found: Orders) -> Iterator[Exhibit]:
+def figures(results: Orders) -> Iterator[Exhibit]:
     """Yield error against step size, over the whole flight and before the first impact."""
-    studies, starts = _measured(found, WHOLE), _measured(found, START)
+    studies, starts = _measured(results, WHOLE), _measured(results, START)
     if not studies:
         return
     words = f"Over the whole flight: {'; '.join(map(_converges, studies))}."
@@ -298,5 +298,5 @@ CHAPTER: Final = Chapter(
     kind="regression",
     figures=figures,
     work={"check": 0, "quick": 6, "full": 7},
-    page=lambda found: {"studies": _measured(found, WHOLE)},
+    page=lambda results: {"studies": _measured(results, WHOLE)},
 )

@@ -19,9 +19,9 @@ def study(ask: Ask) -> Study[list[tuple[Vector, Made]]]:
     return [(vector, flights[run]) for vector, run in zip(vectors, runs, strict=True)]
 
 
-def claims(found: list[tuple[Vector, Made]]) -> Claims:
+def claims(results: list[tuple[Vector, Made]]) -> Claims:
     """Yield the largest deviation of each run from what was printed."""
-    for vector, made in found:
+    for vector, made in results:
         title = f"output of the paper's program, {vector.name}"
         yield judged(claim_vectors, vector, made, id=f"vectors-{vector.name}", title=title)
 

@@ -69,7 +69,7 @@ def _pair(study: WorkPrecision, first_key: str, second_key: str) -> Finding:
 
     def against(cost: Cost, unit: str, scale: float = 1.0) -> str:
         prices = (curve.price(error, cost) for curve in (first, second))
-        return " against ".join("–" if found is None else f"{scale * found.value:.2g}" for found in prices) + f" {unit}"
+        return " against ".join("–" if price is None else f"{scale * price.value:.2g}" for price in prices) + f" {unit}"
 
     limit = {(False, True): "at least, ", (True, False): "at most, "}.get((steps_a.bound, steps_b.bound), "")
     count_a, count_b = (f"{'at most ' if steps.bound else ''}{steps.value:.0f}" for steps in (steps_a, steps_b))
@@ -235,6 +235,6 @@ CHAPTER: Final = Chapter(
     claims=claims,
     figures=figures,
     work={"full": FULL},
-    summary=lambda found: {"work_precision": summarise_work_precision(found)},
-    page=lambda found: {"table": tabulate(found)},
+    summary=lambda results: {"work_precision": summarise_work_precision(results)},
+    page=lambda results: {"table": tabulate(results)},
 )
