@@ -28,7 +28,7 @@ from flipproof.foreign.contract import (
     WaitingError,
     answer_of,
 )
-from flipproof.foreign.processes import KEPT, PATIENCE, end, ending, half_of_memory, last_line, start
+from flipproof.foreign.processes import KEPT, ending, last_line
 from flipproof.foreign.specs import words_of, written
 from flipproof.output.files import write_whole
 from slicemodel.scenario import unknown_name
@@ -119,69 +119,53 @@ PLACEHOLDERS: Final = ("scenario", "times", "start", "effort", "out")
 """What a command may hold in braces: the files that it is to read, its effort, and the file that it is to write."""
 
 
-class Command(Runner):
-    """A program: flipproof writes scenario, times and start as files, calls it, and reads the CSV that it wrote.
+def traits_of_command(spec: str, timeout: float | None, given: Mapping[str, Any]) -> Traits:
+    """Return what is ``given`` of a program, which cannot say it itself; {effort} is a step unless that says otherwise.
 
-    What it cannot say of itself is ``given``; one with {effort} takes it for a step unless that says otherwise.
+    Raises ValueError for a command without {out} or with other words in braces.
     """
+    words = words_of(spec)
+    if not words or not any("{out}" in word for word in words):
+        raise ValueError(f"solver {spec!r}: a command must hold {{out}}, the CSV file that it is to write")
+    for name in re.findall(r"(?<!\{)\{([A-Za-z_]+)\}(?!\})", " ".join(words)):
+        if name not in PLACEHOLDERS:
+            unknown = unknown_name(f"solver {spec!r}: placeholder", name, PLACEHOLDERS)
+            raise ValueError(f"{unknown} (write {{{{{name}}}}} if it is the program's own)")
+    effort = any("{effort}" in word for word in words)
+    name = next((Path(w).name for w in words[1:] if not w.startswith(("-", "{"))), Path(words[0]).name)
+    said = {"name": name, "refined_by": "dt" if effort else None, "timeout": timeout or 60.0, **given}
+    if said["refined_by"] and not effort:
+        raise ValueError(f"solver {spec!r}: refined_by = {said['refined_by']!r} needs {{effort}} in the command")
+    return Traits(**said)
 
-    def __init__(
-        self,
-        spec: str,
-        timeout: float | None = None,
-        memory: float | None = None,
-        given: Mapping[str, Any] = MappingProxyType({}),
-    ) -> None:
-        self.words = words_of(spec)
-        if not self.words or not any("{out}" in word for word in self.words):
-            raise ValueError(f"solver {spec!r}: a command must hold {{out}}, the CSV file that it is to write")
-        for name in re.findall(r"(?<!\{)\{([A-Za-z_]+)\}(?!\})", " ".join(self.words)):
-            if name not in PLACEHOLDERS:
-                words = unknown_name(f"solver {spec!r}: placeholder", name, PLACEHOLDERS)
-                raise ValueError(f"{words} (write {{{{{name}}}}} if it is the program's own)")
-        effort = any("{effort}" in word for word in self.words)
-        self.timeout, self.memory = timeout or 60.0, memory or half_of_memory()
-        self._late = 0
-        name = next((Path(w).name for w in self.words[1:] if not w.startswith(("-", "{"))), Path(self.words[0]).name)
-        said = {"name": name, "refined_by": "dt" if effort else None, "timeout": self.timeout, **given}
-        if said["refined_by"] and not effort:
-            raise ValueError(f"solver {spec!r}: refined_by = {said['refined_by']!r} needs {{effort}} in the command")
-        self.traits = Traits(**said)
 
-    def __call__(self, ask: Ask) -> Answer:
-        """Return the checked answer."""
-        if self._late >= PATIENCE:
-            raise ForeignError(f"not asked: {PATIENCE} runs in a row gave no answer in time")
-        with tempfile.TemporaryDirectory(prefix="flipproof-", ignore_cleanup_errors=True) as scratch:
-            values = write_ask(ask, Path(scratch))
-            words = self.words
-            for name, value in values.items():
-                words = [word.replace(f"{{{name}}}", value) for word in words]
-            self._run([word.replace("{{", "{").replace("}}", "}") for word in words])
-            out = Path(values["out"])
-            if not out.is_file():
-                raise ForeignError(f"{self.words[0]} ended without writing {{out}}")
-            return answer_in(out, ask, "{out}")
+def run_command(spec: str, folder: str, ask: Ask) -> Answer:
+    """Write scenario, times and start as files, call a program, and return the answer in the CSV that it wrote.
 
-    def _run(self, words: list[str]) -> None:
-        with tempfile.TemporaryFile() as said:
-            try:
-                null = subprocess.DEVNULL
-                process = start(words, self.memory, stdin=null, stdout=null, stderr=said)
-            except OSError as error:
-                raise ForeignError(f"{words[0]} cannot be started ({error.strerror or error})") from None
-            try:
-                status = process.wait(timeout=self.timeout)
-                self._late = 0
-            except subprocess.TimeoutExpired:
-                self._late += 1
-                raise ForeignError(f"no answer within {self.timeout:g} s; the program was ended") from None
-            finally:
-                end(process)
-            if status:
-                said.seek(max(0, said.seek(0, 2) - KEPT))
-                last = last_line(said.read())
-                raise ForeignError(f"{words[0]} {ending(status)}{f': {last}' if last else ''}")
+    It runs in the process of the solver (``isolated.serve``), which is held to limits and ended with what it leaves;
+    ``folder`` holds the files and is removed then.
+    """
+    words = words_of(spec)
+    with tempfile.TemporaryDirectory(dir=folder) as scratch, tempfile.TemporaryFile() as printed:
+        values = write_ask(ask, Path(scratch))
+        given = words
+        for name, value in values.items():
+            given = [word.replace(f"{{{name}}}", value) for word in given]
+        null = subprocess.DEVNULL
+        try:
+            status = subprocess.call(
+                [word.replace("{{", "{").replace("}}", "}") for word in given], stdin=null, stdout=null, stderr=printed
+            )
+        except OSError as error:
+            raise ForeignError(f"{words[0]} cannot be started ({error.strerror or error})") from None
+        if status:
+            printed.seek(max(0, printed.seek(0, 2) - KEPT))
+            last = last_line(printed.read())
+            raise ForeignError(f"{words[0]} {ending(status)}{f': {last}' if last else ''}")
+        out = Path(values["out"])
+        if not out.is_file():
+            raise ForeignError(f"{words[0]} ended without writing {{out}}")
+        return answer_in(out, ask, "{out}")
 
 
 class Folder(Runner):

@@ -16,6 +16,7 @@ import os
 import selectors
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, BinaryIO
@@ -24,25 +25,32 @@ import numpy as np
 
 from flipproof.foreign import contract
 from flipproof.foreign.contract import IMPACT, Answer, AnswerError, Ask, ForeignError, Runner, Traits, answer_of
+from flipproof.foreign.files import run_command
 from flipproof.foreign.processes import KEPT, PATIENCE, end, ending, half_of_memory, last_line, start
-from flipproof.foreign.specs import distribution_of, is_foreign, load
+from flipproof.foreign.specs import COMMAND, distribution_of, is_foreign, load, written
 from slicemodel import Scenario
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 
 class Isolated(Runner):
-    """The solver that a spec names, in a process that is started when it is first needed and again after a crash."""
+    """The solver that a spec names, in a process that is started when it is first needed and again after a crash.
 
-    def __init__(self, spec: str, timeout: float | None = None, memory: float | None = None) -> None:
+    ``traits`` are given for a program, which cannot say them itself.
+    """
+
+    def __init__(
+        self, spec: str, timeout: float | None = None, memory: float | None = None, traits: Traits | None = None
+    ) -> None:
         self.spec, self.timeout, self.memory = spec, timeout, memory or half_of_memory()
+        self._given = traits
         self._process: subprocess.Popen[bytes] | None = None
         self._late = 0
 
     @functools.cached_property
     def traits(self) -> Traits:  # type: ignore[override]  # an attribute, but filled when it is first asked for
         """What the solver says of itself; loads it."""
-        return self._start()
+        return self._given or self._start()
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer.
@@ -76,6 +84,7 @@ class Isolated(Runner):
         if process is None:
             return
         end(process)
+        self._scratch.cleanup()
         for stream in (process.stdin, process.stdout, process.stderr):
             with contextlib.suppress(OSError):
                 stream.close()  # type: ignore[union-attr]
@@ -89,10 +98,13 @@ class Isolated(Runner):
         self._printed = b""
         for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
             os.set_blocking(stream.fileno(), False)  # type: ignore[union-attr]
-        header, _ = self._exchange({"spec": self.spec}, {}, 60.0, 0)
+        self._scratch = tempfile.TemporaryDirectory(prefix="flipproof-", ignore_cleanup_errors=True)
+        header, _ = self._exchange({"spec": self.spec, "scratch": self._scratch.name}, {}, 60.0, 0)
         if "reason" in header:
             self.close()
             raise ForeignError(f"{self.spec} cannot be loaded: {header['reason']}")
+        if self._given is not None:
+            return self._given
         try:
             traits = Traits(**header["traits"])
             refuse_built_in(traits.name)
@@ -176,9 +188,10 @@ def serve() -> None:
     os.dup2(empty, 0)
     os.dup2(2, 1)
     sys.dont_write_bytecode = True  # a copy of a file that is edited in the same second would be taken for it
-    spec = receive(inbox, 0)[0]["spec"]
+    asked, _ = receive(inbox, 0)
+    spec = asked["spec"]
     try:
-        solver = load(spec)
+        solver = functools.partial(run_command, spec, asked["scratch"]) if written(spec)[0] == COMMAND else load(spec)
         traits = contract.traits_of(solver, spec)
         solve = contract.solve_of(solver)
         said = {name: getattr(traits, name) for name in traits.__slots__}
@@ -215,6 +228,8 @@ def _reason(error: BaseException) -> str:
         words = shortened(str(error), 300) or "no message"
     except Exception:
         words = "a message that cannot be shown"
+    if isinstance(error, ForeignError):
+        return words
     return f"answer: {words}" if isinstance(error, AnswerError) else f"{type(error).__name__}: {words}"
 
 

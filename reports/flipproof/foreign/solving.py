@@ -14,7 +14,7 @@ import numpy as np
 
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, answer_of, started, trajectory_of
-from flipproof.foreign.files import Command, File, Folder
+from flipproof.foreign.files import File, Folder, traits_of_command
 from flipproof.foreign.isolated import Isolated
 from flipproof.foreign.specs import (
     COMMAND,
@@ -91,7 +91,7 @@ def opened(
     how, held = written(spec)
     if how != OBJECT:
         if how == COMMAND:
-            return Command(spec, timeout, memory, given)
+            return Isolated(spec, timeout, memory, traits_of_command(spec, timeout, given))
         if is_folder(held):
             return Folder(Path(held), given)
         if not curves:

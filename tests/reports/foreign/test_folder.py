@@ -4,6 +4,7 @@ import csv
 import json
 import shutil
 import subprocess
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -113,7 +114,8 @@ def test_the_example_in_javascript_passes_by_its_command_and_by_files(tmp_path):
     script = EXAMPLES / "eq8.mjs"
     spec = f"cmd:node {script} {{scenario}} {{times}} {{start}} {{effort}} {{out}}"
     names = ["shape", "start", "ice", "angular-momentum", "mirror", "equation"]
-    found = certify(opened(spec, given={"order": 4.0}), names, equation="eq8")
+    with closing(opened(spec, given={"order": 4.0})) as runner:
+        found = certify(runner, names, equation="eq8")
     assert [r.verdict for r in found.results] == [PASSED] * 6
     folder = Folder(tmp_path / "answers", {"equation": "eq8", "refined_by": "dt"})
     for _ in range(3):
@@ -126,7 +128,8 @@ def test_the_example_in_javascript_passes_by_its_command_and_by_files(tmp_path):
 def test_the_papers_matlab_program_prints_its_numbers_in_octave(tmp_path):
     script = EXAMPLES / "paper.m"
     runner = opened(f"cmd:octave-cli -q {script} {{scenario}} {{times}} {{start}} {{effort}} {{out}}")
-    found = certify(runner, ["ice", "restitution", "published-vectors"], equation="published-matlab")
+    with closing(runner):
+        found = certify(runner, ["ice", "restitution", "published-vectors"], equation="published-matlab")
     ice, restitution, vectors = found.results
     assert [ice.verdict, vectors.verdict] == [PASSED, PASSED]
     assert vectors.found.facts["vectors"] < 1e-10

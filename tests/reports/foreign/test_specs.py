@@ -101,9 +101,9 @@ def test_a_program_answers_by_files(tmp_path):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     spec = f"cmd:{sys.executable} {program} {{times}} {{start}} {{effort}} {{out}}"
-    runner = opened(spec)
-    assert (runner.traits.name, runner.traits.refined_by) == ("program.py", "dt")
-    answer = runner(ASK)
+    with closing(opened(spec)) as runner:
+        assert (runner.traits.name, runner.traits.refined_by) == ("program.py", "dt")
+        answer = runner(ASK)
     np.testing.assert_array_equal(answer.omega, np.full(5, 0.25))
     np.testing.assert_array_equal(answer.r[3], ASK.start)
     run = solve(spec, THROW)
@@ -115,7 +115,7 @@ def test_a_program_answers_by_files(tmp_path):
     [
         ("import sys; sys.exit('no licence')", "ended with status 1: no licence"),
         ("pass", "ended without writing {out}"),
-        ("import time; time.sleep(100)", "no answer within 1 s; the program was ended"),
+        ("import time; time.sleep(100)", "no answer within 1 s; the process was ended"),
         ("import os; os.abort()", "was ended by SIGABRT"),
         ("import sys; open(sys.argv[1], 'w').write('')", "has no header"),
         ("import sys; open(sys.argv[1], 'w').write('t,theta\\n0,1\\n')", "omega missing"),
@@ -136,8 +136,9 @@ def test_a_program_answers_by_files(tmp_path):
 def test_a_program_that_fails_says_how(tmp_path, body, said):
     program = tmp_path / "program.py"
     program.write_text(body)
-    with pytest.raises(ForeignError, match=said) as caught:
-        opened(f"cmd:{sys.executable} {program} {{out}}", timeout=1.0 if "sleep" in body else 300.0)(ASK)
+    runner = opened(f"cmd:{sys.executable} {program} {{out}}", timeout=1.0 if "sleep" in body else 300.0)
+    with closing(runner), pytest.raises(ForeignError, match=said) as caught:
+        runner(ASK)
     assert "\n" not in str(caught.value)
 
 
@@ -149,12 +150,18 @@ def test_what_a_program_cannot_say_is_given():
         opened("cmd:program {out}", given={"refined_by": "dt"})
     with pytest.raises(ValueError, match="says itself what it is"):
         opened("mine.py:solve", given={"order": 2.0})
-    assert opened("cmd:awk '{{print}}' {out}").words[1] == "{{print}}"
 
 
-def test_a_program_that_is_not_there_says_so():
-    with pytest.raises(ForeignError, match="no-such-program cannot be started"):
-        opened("cmd:no-such-program {out}")(ASK)
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("no-such-program {out}", "no-such-program cannot be started"),
+        ("sh -c 'echo {{its own}} >&2; exit 1' {out}", r"sh ended with status 1: \{its own\}"),
+    ],
+)
+def test_a_program_that_cannot_answer_says_so(command, said):
+    with closing(opened(f"cmd:{command}")) as runner, pytest.raises(ForeignError, match=said):
+        runner(ASK)
 
 
 def test_a_curve_answers_at_its_own_times(tmp_path):
@@ -207,8 +214,8 @@ def test_a_run_of_a_foreign_solver_is_a_run(tmp_path):
 @pytest.mark.skipif(shutil.which("sh") is None, reason="no shell")
 def test_a_program_gets_no_input_and_its_output_is_dropped():
     runner = opened("cmd:sh -c 'cat; echo t,theta,omega > {out}; echo 0,1,2 >> {out}; echo noise'")
-    one = Ask.of(THROW, np.array([0.0]))
-    assert runner(one).omega[0] == 2.0
+    with closing(runner):
+        assert runner(Ask.of(THROW, np.array([0.0]))).omega[0] == 2.0
 
 
 def test_frames_come_back_and_what_is_none_is_refused():
