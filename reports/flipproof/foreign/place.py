@@ -12,7 +12,7 @@ solvers' own errors, and what is no choice of the ladder.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from itertools import pairwise
@@ -276,23 +276,14 @@ def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
 
 def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
     """Return the mean change of the plateau over all orders of turning the switches from ``start`` to ``end``."""
-
-    def of(switches: Switches) -> float:
-        found = curve(switches.name, throw, times_of(throw, 1000))
-        return plateau(found.t, found.omega, throw.omega0)
-
-    return {name: shapley.mean(changes) for name, changes in changes_of(start, end, of).items()}
-
-
-def changes_of(start: Switches, end: Switches, of: Callable[[Switches], float]) -> dict[str, list[tuple[float, float]]]:
-    """Return for every differing switch the changes of a number in single orders, each with its share of all orders.
-
-    ``of`` returns the number by the equation of a set of switches; it is asked once for each.
-    """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
-    once = cache(of)
+
+    @cache
+    def plateau_of(switches: Switches) -> float:
+        flown = curve(switches.name, throw, times_of(throw, 1000))
+        return plateau(flown.t, flown.omega, throw.omega0)
 
     def value(turned: tuple[str, ...]) -> float:
-        return once(canonical(replace(start, **{name: getattr(end, name) for name in turned})))
+        return plateau_of(canonical(replace(start, **{name: getattr(end, name) for name in turned})))
 
-    return shapley.changes_of(differing, value)
+    return shapley.fair_shares(differing, value)
