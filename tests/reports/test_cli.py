@@ -12,7 +12,7 @@ import pytest
 from made_up import command as run
 
 from flipproof.cli import main as cli
-from flipproof.cli.arguments import check_outputs
+from flipproof.cli.arguments import output, refuse_overwriting
 from flipproof.cli.screens import commands_of
 
 
@@ -210,8 +210,19 @@ def test_closed_output_a_full_disk_a_removed_folder_and_a_pipe(tmp_path):
 
 
 def test_an_option_that_a_command_writes_spares_what_it_reads(tmp_path):
-    """Whatever it is called: ``check_outputs`` is told its name."""
+    """Whatever it is called: its type says that it is written."""
     throw = tmp_path / "throw.toml"
     throw.write_text("[scenario]\n", encoding="utf-8")
+    command = argparse.ArgumentParser()
+    command.add_argument("scenario")
+    command.add_argument("--count", type=output)
     with pytest.raises(ValueError, match=r"--count .* is a file that this command reads"):
-        check_outputs(argparse.Namespace(scenario=str(throw), count=throw), "count")
+        refuse_overwriting(command.parse_args([str(throw), "--count", str(throw)]), command)
+
+
+def test_every_option_that_names_what_is_written_has_the_type_of_one():
+    words = re.compile(r"\b(write|draw|folder to|folder for|folder;|folder \()")
+    for name, command in commands_of(cli.parser()).items():
+        for action in command._actions:
+            if isinstance(action.type, type) and issubclass(action.type, Path):
+                assert not words.search(action.help or ""), f"{name} {action.option_strings}"

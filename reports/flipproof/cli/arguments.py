@@ -115,8 +115,9 @@ count = reader("a whole number of at least 1", digits, lambda value: value >= 1)
 number = reader("a number in (-1e6, 1e6)", float, lambda value: abs(value) < 1e6)
 
 
-WRITTEN: Final = ("out", "json", "junit", "badge", "html", "export", "film", "plot")
-"""Options that name what a command writes, whichever command it is."""
+def output(text: str) -> Path:
+    """Return the path of an option that a command writes: by this type ``refuse_overwriting`` knows such options."""
+    return Path(text)
 
 
 def check_outputs(options: argparse.Namespace, *names: str) -> None:
@@ -124,7 +125,6 @@ def check_outputs(options: argparse.Namespace, *names: str) -> None:
 
     Two options must not name one file, nor one that the command reads; a device or a pipe takes both.
     """
-    refuse_overwriting(options, *names)
     taken: dict[Path, str] = {}
     for name in names:
         path = getattr(options, name)
@@ -138,13 +138,10 @@ def check_outputs(options: argparse.Namespace, *names: str) -> None:
                 raise ValueError(f"--{name} {path} is the file of --{other}, too; name another")
 
 
-def refuse_overwriting(options: argparse.Namespace, *names: str) -> None:
-    """Refuse by a ValueError a command that would write over a file that it reads.
-
-    It writes those of ``WRITTEN`` and of ``names``.
-    """
+def refuse_overwriting(options: argparse.Namespace, command: argparse.ArgumentParser) -> None:
+    """Refuse by a ValueError a command that would write over a file that it reads."""
     given = vars(options)
-    written = dict.fromkeys((*WRITTEN, *names))
+    written = [action.dest for action in command._actions if action.type is output]
     values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
     texts = [str(each) for value in values for each in value if isinstance(each, str | Path)]
     for name in written:
@@ -170,7 +167,7 @@ def _read_by(texts: Sequence[str]) -> Iterator[Path]:
 
 def add_json(command: argparse.ArgumentParser, what: str) -> None:
     """Add ``--json FILE``."""
-    command.add_argument("--json", type=Path, metavar="FILE", help=f"write {what} as JSON, too")
+    command.add_argument("--json", type=output, metavar="FILE", help=f"write {what} as JSON, too")
 
 
 def write_json(path: Path | None, mapping: Mapping[str, Any]) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from flipproof.cli.arguments import add_command, add_json, check_outputs, number, write_json
+from flipproof.cli.arguments import add_command, add_json, check_outputs, number, output, write_json
 from flipproof.cli.progress import progress_bar
 from flipproof.figures.spoken import inert
 
@@ -24,7 +23,7 @@ def add_bounce(commands: Any) -> None:
     bounce.add_argument("--dt", type=number, default=1e-3, metavar="S", help="step in seconds (default 0.001)")
     add_json(bounce, "the passports")
     bounce.add_argument(
-        "--plot", type=Path, metavar="FILE.png", help="draw the passports, a row an engine (.png or .svg)"
+        "--plot", type=output, metavar="FILE.png", help="draw the passports, a row an engine (.png or .svg)"
     )
 
 

@@ -17,6 +17,7 @@ from flipproof.cli.arguments import (
     check_guests,
     check_outputs,
     count,
+    output,
     read_scenario,
     reader,
     store_of,
@@ -40,7 +41,7 @@ def add_checks(commands: Any) -> None:
     diff.add_argument("new", type=Path, metavar="NEW", help="the same; changes are from OLD to NEW")
     diff.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
     diff.add_argument(
-        "--html", type=Path, metavar="FILE", help="write the comparison as one page, too, with the curves of both"
+        "--html", type=output, metavar="FILE", help="write the comparison as one page, too, with the curves of both"
     )
 
     add_json(diff, "the comparison")
@@ -59,7 +60,7 @@ def add_checks(commands: Any) -> None:
     add_guests(check, "certify another solver, too, and hold it to what the baseline knows of it")
     add_json(check, "the findings")
     add_no_cache(check)
-    check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML, too")
+    check.add_argument("--junit", type=output, metavar="FILE", help="write the verdicts as JUnit XML, too")
 
 
 def command_diff(options: argparse.Namespace) -> int:
@@ -155,9 +156,9 @@ def add_compare(commands: Any) -> None:
         "--shift", type=tolerance, default=0.0, metavar="S", help="by how much a jump may be early or late (default: "
         "one step of the output, and what the twins show)",
     )  # fmt: skip
-    compare.add_argument("--plot", type=Path, metavar="FILE.png", help="draw files' differences (.png or .svg)")
+    compare.add_argument("--plot", type=output, metavar="FILE.png", help="draw files' differences (.png or .svg)")
     add_json(compare, "both curves' differences")
-    compare.add_argument("--junit", type=Path, metavar="FILE", help="write that verdict as JUnit XML, too")
+    compare.add_argument("--junit", type=output, metavar="FILE", help="write that verdict as JUnit XML, too")
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from flipproof.cli.arguments import (
     command_line,
     count,
     number,
+    output,
     read_scenario,
 )
 from flipproof.cli.progress import progress_bar
@@ -40,7 +41,7 @@ def add_film(commands: Any) -> None:
     export.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     export.add_argument("--solver", required=True, metavar="NAME", help="see 'flipproof models'")
     export.add_argument("--format", choices=("tracker",), default="tracker", help="data track (%(default)s)")
-    export.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: standard output)")
+    export.add_argument("--out", type=output, metavar="FILE", help="file to write (default: standard output)")
     export.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
     export.add_argument("--speed", type=number, metavar="V", help="of C_M at release [m/s] (default: the scenario's)")
     export.add_argument("--launch-angle", type=number, metavar="DEG", help="of that velocity above the horizontal")
@@ -93,7 +94,9 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
         "--hold", nargs="+", default=[], choices=("tilt", "scale"), help="known: the camera is level; the picture's "
         "scale and clock are right",
     )  # fmt: skip
-    command.add_argument("--out", type=Path, metavar="DIR", help="folder for track.csv, figures, summary.json and page")
+    command.add_argument(
+        "--out", type=output, metavar="DIR", help="folder for track.csv, figures, summary.json and page"
+    )
 
 
 def command_film(options: argparse.Namespace) -> int:

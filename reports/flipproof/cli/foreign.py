@@ -8,7 +8,6 @@ import sys
 import textwrap
 from contextlib import closing
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from flipproof.cli.arguments import (
@@ -17,6 +16,7 @@ from flipproof.cli.arguments import (
     add_json,
     check_outputs,
     count,
+    output,
     read_scenario,
     write_json,
     write_junit,
@@ -47,8 +47,8 @@ def add_foreign(commands: Any) -> None:
     said.add_argument("--order", type=float, metavar="P", help="order of its error before impacts")
     certify.add_argument("--seed", type=int, metavar="K", help="draw other throws for the check elsewhere")
     add_json(certify, "the passport (traits, results, versions)")
-    certify.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
-    certify.add_argument("--badge", type=Path, metavar="FILE", help="draw verdict and domain as SVG, for a README")
+    certify.add_argument("--junit", type=output, metavar="FILE", help="write the verdicts as JUnit XML")
+    certify.add_argument("--badge", type=output, metavar="FILE", help="draw verdict and domain as SVG, for a README")
 
     place = add_command(commands, "place", "Find out which equation a solver solves, and how well.", command_place)
     _add_spec(place)

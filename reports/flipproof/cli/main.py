@@ -30,6 +30,7 @@ from flipproof.cli.arguments import (
     check_outputs,
     command_line,
     count,
+    output,
     read_scenario,
     refuse_overwriting,
     store_of,
@@ -71,7 +72,6 @@ def _status(arguments: Sequence[str] | None) -> int:
     announce_compiling()
     try:
         options = parse(sys.argv[1:] if arguments is None else arguments)
-        refuse_overwriting(options)
         status = options.action(options)
         sys.stdout.flush()
         return int(status)
@@ -154,6 +154,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     if "action" not in options:
         top.print_help()
         sys.exit(BAD_INPUT)
+    refuse_overwriting(options, command)
     return options
 
 
@@ -167,7 +168,7 @@ def parser() -> argparse.ArgumentParser:
 
     report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
     report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    report.add_argument("--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
+    report.add_argument("--out", type=output, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
     report.add_argument("--quick", action="store_true", help="fewer refinements, no second method, no validity maps")
     report.add_argument(
         "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
@@ -195,7 +196,7 @@ def parser() -> argparse.ArgumentParser:
     )
     simulate.add_argument("--steps", type=count, metavar="P", help="points of a scheme's grid (default 1000)")
     simulate.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
-    simulate.add_argument("--out", type=Path, metavar="FILE.csv", help="file to write (default: standard output)")
+    simulate.add_argument("--out", type=output, metavar="FILE.csv", help="file to write (default: standard output)")
 
     add_compare(commands)
     add_paper(commands)
