@@ -45,7 +45,7 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("paper", "The paper's figures and claims", "Every statement of the paper about its model and about the bottles "
      "really thrown: the first judged by three equations, the second by every model.", ("paper",)),
     ("guests", "Guests",
-     "Solvers of other people: each is certified first, then held against the ladder on the throw of this report.",
+     "Solvers of other people: the certificate of each, what refinement buys, and what leads from it to free flight.",
      ("guests",)),
     ("errata", "Errata of the paper",
      "What the paper prints, what follows from its own earlier equations, and the number that separates the two.",
