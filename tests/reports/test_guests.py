@@ -7,14 +7,15 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
-from flipproof.chapters.guests.chapter import summarise
-from flipproof.chapters.guests.study import FREE, energy_of, start_of
+from flipproof.chapters.guests.chapter import claims, summarise
+from flipproof.chapters.guests.study import FREE, energy_of, placed_on, start_of
 from flipproof.chapters.solvers import SPARSE, facts_of, invited
 from flipproof.chapters.waterfall.chapter import figure_waterfall
 from flipproof.cli import main as cli
@@ -146,6 +147,20 @@ def test_the_flight_that_is_shown_is_held_to_the_equation_of_the_guest(tmp_path,
         "        return super().solve(replace(ask, scenario=replace(ask.scenario, drag=more * ask.scenario.drag)))\n"
     )
     assert [one.id for one in Reported(mine(tmp_path, "few", body)).failed] == ["guest-naive-rk4-flight"]
+
+
+def test_a_flight_is_held_to_where_the_certificate_places_a_solver_that_declares_nothing(reported):
+    visit, silent = reported.visits[0], SimpleNamespace(traits=Traits(name="silent"))
+    place = SimpleNamespace(facts={"place": {"equation": "eq8", "on_lattice": True}})
+    certificate = SimpleNamespace(results=[SimpleNamespace(found=place)])
+    rung = solve("eq8", THROW, times=TIMES)
+    slow = replace(rung, omega=rung.omega * np.linspace(1.0, 0.5, len(TIMES)))
+    assert placed_on(visit.guest, certificate, {"eq8": rung}, slow) is None  # what it declares is claimed elsewhere
+    assert placed_on(silent, certificate, {"eq8": rung}, rung) == ("eq8", 0.0)
+    name, off = placed_on(silent, certificate, {"eq8": rung}, slow)
+    for size, failed in ((1e-4, False), (off, True), (np.nan, True)):
+        (claim,) = (c for c in claims([replace(visit, placed=(name, size))]) if c.id == "guest-naive-rk4-flight")
+        assert claim.failed is failed
 
 
 def test_solvers_of_one_name_are_told_apart(tmp_path):

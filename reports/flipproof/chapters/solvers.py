@@ -69,6 +69,9 @@ LEVELS: Final = (-4, -2, 0, 2)
 SPARSE: Final = 27
 """Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
 
+UNREFINED: Final = 0.09
+"""How far the flight of a guest that cannot be refined may be off its equation, fraction of omega_0."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Guest:

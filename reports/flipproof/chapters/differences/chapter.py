@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from engine_check.engines import ENGINES
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
 from flipproof.chapters.predictability.chapter import parting_words
-from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, WITNESSES, Guest
+from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, UNREFINED, WITNESSES, Guest
 from flipproof.figures.spoken import spoken
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import (
@@ -194,7 +194,7 @@ def claim_guest(d: Difference, guest: Guest, own: float | None) -> Iterator[Find
     title, note = f"{d.second} and {d.first}: largest difference in ω", f"at t = {d.largest_time:.4g} s"
     yield observed(f"guest-{guest.slug}-{d.first}", title, d.largest, "of ω₀", note, band=band)
     if guest.traits is not None and guest.traits.equation == d.first:
-        room = 0.09 if own is None else 1e-3 + 5 * (d.band or 0.0)
+        room = UNREFINED if own is None else 1e-3 + 5 * (d.band or 0.0)
         words = "it cannot be refined" if own is None else f"its own change between its finest efforts is {own:.2g}"
         title = f"{d.second}: largest difference in ω from {d.first}, the equation that it declares"
         note = f"N = {d.slices}, t = {d.largest_time:.4g} s; {words}"

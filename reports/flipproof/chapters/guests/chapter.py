@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.guests.study import Visit, study
+from flipproof.chapters.solvers import UNREFINED
 from flipproof.chapters.waterfall.chapter import bars_csv, figure_waterfall
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, styled
 from flipproof.foreign.certify import findings_of
-from flipproof.frame.chapter import Absent, Band, Chapter, Claims, Exhibit, observed
+from flipproof.frame.chapter import Absent, Band, Chapter, Claims, Exhibit, observed, regression
 from flipproof.frame.equations import NAMES
 from flipproof.output.columns import rows_csv
 
@@ -38,6 +39,12 @@ def claims(found: Sequence[Visit]) -> Claims:
             note = f"fair shares of what its equation assumes: {parts}; {rest.name} {rest.average:+.2g}"
             band = Band.of(visit.band, "refinement")
             yield observed(f"{head}-waterfall", title, waterfall.total, "", note, band=band)
+        if visit.placed is not None:
+            rung, off = visit.placed
+            room = UNREFINED if visit.band is None else 1e-3 + 5 * visit.band
+            own = "it cannot be refined" if visit.band is None else f"its own change is {visit.band:.2g}"
+            title = f"{label}: largest difference in ω from {rung}, the equation it was placed on"
+            yield regression(f"{head}-flight", title, off, "of ω₀", (0.0, room), own)
         if visit.rise is not None:
             title = f"{label}: largest rise of the energy between two output times"
             yield observed(f"{head}-energy", title, visit.rise, "of E(0)")

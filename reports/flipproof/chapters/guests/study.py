@@ -62,6 +62,8 @@ class Visit:
 
     ``equation`` is the rung that it declares, or the nearest; ``band`` the largest change of omega between its two
     finest efforts, fraction of omega_0; ``rise`` the largest of its energy between two output times, fraction of E(0).
+    ``placed`` is the rung that the certificate places it on, if it declares none, and how far its flight is from that
+    one, fraction of omega_0.
     """
 
     guest: Guest
@@ -71,6 +73,7 @@ class Visit:
     efforts: Mapping[str, Outcome[Effort]]
     rise: float | None
     waterfall: Outcome[Waterfall]
+    placed: tuple[str, float] | None = None
 
     @property
     def problems(self) -> dict[str, str]:
@@ -103,17 +106,19 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
         flight = flights.trajectory(flown[guest]) if guest in flown else None
         equation = guest.equation(rungs, flight)
         made = guest.efforts(ask.throw)
+        certificate: Outcome[Certificate] = Outcome(None, "a curve in a file cannot be asked")
+        if guest in calls:
+            certificate = attempt(flights.answer, calls[guest])
         visits.append(
             Visit(
                 guest=guest,
-                certificate=attempt(flights.answer, calls[guest])
-                if guest in calls
-                else Outcome(None, "a curve in a file cannot be asked"),
+                certificate=certificate,
                 equation=equation,
                 band=guest.band(ask.throw, flights),
                 efforts={run.name: attempt(effort_of, run, rungs.get(equation), flights) for run in made},
                 rise=rise_of(flight) if flight is not None and len(flight.v) == len(flight.t) else None,
                 waterfall=Outcome(None, "" if flight is None else "what it declares is no equation of the ladder"),
+                placed=placed_on(guest, certificate.found, rungs, flight),
             )
         )
     starts = {visit.guest: start for visit in visits if (start := start_of(visit)) is not None}
@@ -124,6 +129,26 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
         else visit
         for visit in visits
     )
+
+
+def placed_on(
+    guest: Guest, certificate: Certificate | None, rungs: Mapping[str, Trajectory], flight: Trajectory | None
+) -> tuple[str, float] | None:
+    """Return the rung that a certificate places an undeclared solver on, and how far its flight is from it."""
+    place = place_in(certificate)
+    declared = guest.traits is not None and guest.traits.equation is not None
+    if declared or flight is None or place is None or not place["on_lattice"] or place["equation"] not in rungs:
+        return None
+    rung = rungs[place["equation"]]
+    off = np.abs(np.interp(flight.t, rung.t, rung.omega) - flight.omega)
+    return str(place["equation"]), float(np.max(off) / abs(flight.scenario.omega0))
+
+
+def place_in(certificate: Certificate | None) -> Mapping[str, Any] | None:
+    """Return where a certificate places a solver among the equations, if it does."""
+    results = () if certificate is None else certificate.results
+    places = [r.found.facts["place"] for r in results if r.found is not None and "place" in r.found.facts]
+    return places[0] if places else None
 
 
 def certified(spec: str, timeout: float | None) -> Certificate:
@@ -171,10 +196,8 @@ def start_of(visit: Visit) -> Switches | None:
             return switches_of(traits.equation)
         except ValueError:
             return None
-    results = () if certificate is None else certificate.results
-    places = [r.found.facts["place"] for r in results if r.found is not None and "place" in r.found.facts]
-    if places:
-        return Switches.from_name(places[0]["switches"])
+    if (place := place_in(certificate)) is not None:
+        return Switches.from_name(place["switches"])
     return switches_of(visit.equation) if visit.equation else None
 
 
