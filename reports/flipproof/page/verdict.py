@@ -163,7 +163,7 @@ def _steps(study: StepCosts) -> Iterator[Headline]:
 
 
 def answer(headlines: Sequence[Headline]) -> str:
-    """Return the verdict in two sentences: step, algebra and physics; and which equation to take instead.
+    """Return the verdict in short: physics, algebra and step; and which equation to take instead.
 
     Each holds if no curve of omega moves by more than PARTING_BAND of omega_0; weight is named if no other rung of the
     ladder moves it further.
@@ -174,11 +174,11 @@ def answer(headlines: Sequence[Headline]) -> str:
     within = percent(PARTING_BAND)
     weight = "pair" in by_id and by_id["pair"].what == RUNG_NAMES["weightless"]
     solved = "program-eq8" not in by_id or by_id["program-eq8"].value <= PARTING_BAND
-    physics = "Eq. 8 lets gravity push the water" if weight else "Eq. 8 is not free flight"
-    instead = "For slices, use free flight; for water, rods that cannot overlap."
+    physics = "Eq. 8 lets gravity slide water along the bottle" if weight else "Eq. 8 is not free flight"
+    algebra = "" if solved else ", and the program’s formulas do not solve it"
+    instead = "For slices, use free flight; for water, rods are the best guess."
     return {
-        (True, False): "Not as it stands: the program’s steps are short enough, but "
-        f"{'' if solved else 'its formulas do not solve Eq. 8, and '}{physics}. {instead}",
+        (True, False): f"Not as it stands: {physics}{algebra}. The time steps are short enough. {instead}",
         (True, True): f"On this throw the steps are short enough. Eq. 8 is free flight within {within} of ω₀.",
         (False, True): f"On this throw the steps are too long. Eq. 8 is free flight within {within} of ω₀.",
         (False, False): f"On this throw the steps are too long, and Eq. 8 is not free flight. {instead}",

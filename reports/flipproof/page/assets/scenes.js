@@ -3,7 +3,7 @@
   "use strict";
   const { g, theta0, fill, gamma, e, omega0, ...fixed } = JSON.parse(document.getElementById("live-data").textContent);
   const start = { ...fixed, g, theta0, fill, gamma, e, omega0 }, chart = window.flipproofChart, live = window.flipproofLive;
-  const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8, no gravity", bare: "Eq. 8, no gravity, no drag" };
+  const NAMES = { eq8: "Eq. 8", free: "free flight", rods: "rods", still: "Eq. 8 without gravity", bare: "Eq. 8 without gravity and drag" };
   const COLOURS = { eq8: "eq8", free: "free-flight", rods: "rods", still: "eq8", bare: "eq8" };
   const FRAMES = 251, SLOW = 9;
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -62,9 +62,9 @@
       pen.strokeRect(-0.4 * half, -0.3 * half, 0.8 * half, 0.3 * half);
       pen.restore();
     }
-    // On its way over the picture, a parabola where there is weight and a straight line where there is none.
+    // On its way over the picture: a parabola, or a straight line where gravity is off or no solver knows it.
     function place(share, left, wide, reach) {
-      const bent = Math.min(1, thrown.g / 9.81), rise = Math.max(0, BOTTLES - 22 - 1.6 * reach);
+      const bent = solvers.every((solver) => solver === "still" || solver === "bare") ? 0 : Math.min(1, thrown.g / 9.81), rise = Math.max(24, BOTTLES - 22 - 1.6 * reach);
       return [left + reach + share * (wide - 2 * reach), 22 + (BOTTLES - 22) / 2 + bent * rise * (4 * (share - 0.5) ** 2 - 0.5)];
     }
     function draw() {
@@ -85,7 +85,7 @@
         pen.lineTo(left + wide - 14, height - 18);
         pen.stroke();
         const ghosts = wide < 330 ? 125 : 50;
-        for (let k = 0; k < frame - 20; k += ghosts) bottle(solver, flown, scale, place(k / (FRAMES - 1), left, wide, reach), k, 0.3);
+        for (let k = 0; k < frame - 20; k += ghosts) bottle(solver, flown, scale, place(k / (FRAMES - 1), left, wide, reach), k, 0.4);
         bottle(solver, flown, scale, place(frame / (FRAMES - 1), left, wide, reach), frame);
         const curve = (omega, end, faint) => {
           pen.globalAlpha = faint ? 0.4 : 1;
@@ -103,7 +103,7 @@
         pen.fillText(NAMES[solver], left + 8, 16);
         pen.font = `12px ${getComputedStyle(canvas).fontFamily}`;
         pen.fillStyle = style("--soft");
-        pen.fillText(`spin: ${(100 * flown.omega[frame] / thrown.omega0).toFixed(0)} % of the start`, left + 8, height - 6);
+        pen.fillText(`spin: ${(100 * flown.omega[frame] / thrown.omega0).toFixed(0)} % of the initial spin`, left + 8, height - 6);
       });
     }
     function stop() { cancelAnimationFrame(playing); playing = 0; }
@@ -124,7 +124,7 @@
       if (slider) said.textContent = now.map((_, j) => `${NAMES[solvers[j]]}: ω moves by up to ${percent(moved[j])} of ω₀.`).join(" ");
       else said.textContent = thrown.g
         ? root.dataset.asked
-        : `Gravity is off. By Eq. 8 the spin changes by up to ${percent(moved[0])} of what it was at release, in free flight by ${percent(moved[1])}. A falling bottle cannot know where down is: Eq. 8 is not the equation of a flying bottle.`;
+        : `Gravity is off (grey: on). This moves the spin of Eq. 8 by up to ${percent(moved[0])} of the initial spin, that of free flight by ${percent(moved[1])}. Bottle and water fall together: gravity cannot move one against the other.`;
       root.dataset.moved = moved.map((share) => share.toPrecision(6)).join(" ");
     }
     function set(change) {
