@@ -41,7 +41,10 @@ def made(make):
 
 
 def test_examples_are_what_the_code_prints(made, tmp_path):
-    """Text and every number but the last printed digit, which another processor may round otherwise."""
+    """Text and every position but the last printed digit, which another processor may round otherwise.
+
+    Thirty-three slices in free flight amplify a rounding error.
+    """
     assert sorted(made) == TRACKED
     for name, content in made.items():
         stored = EXAMPLES / name
@@ -53,10 +56,24 @@ def test_examples_are_what_the_code_prints(made, tmp_path):
         assert list(one.tracks) == list(other.tracks)
         for track in one.tracks:
             for column, values in one.tracks[track].columns.items():
-                assert values == pytest.approx(other.tracks[track].columns[column], rel=2e-3, abs=2e-6, nan_ok=True), (
+                if column.startswith("v"):
+                    continue
+                assert values == pytest.approx(other.tracks[track].columns[column], rel=2e-3, abs=2e-5, nan_ok=True), (
                     name
                 )
         assert stored.read_bytes()[:40] == content[:40]
+
+
+def test_velocities_of_an_example_are_differences_of_its_positions():
+    """To the last printed digit of the positions, 1e-4 m, over the time between neighbours."""
+    table, between = read_track_table(EXAMPLES / "older_headings.txt"), 2 / 240
+    for track in table.tracks.values():
+        for axis in "xy":
+            slopes = (track.columns[axis][2:] - track.columns[axis][:-2]) / between
+            there = np.isfinite(slopes)
+            assert there.sum() > 100
+            assert np.all(np.abs(track.columns[f"v{axis}"][1:-1] - slopes)[there] < 1.2e-4 / between)
+            assert np.any(np.abs(slopes[there]) > 1.0)
 
 
 def test_examples_say_that_they_are_synthetic():
