@@ -28,7 +28,7 @@ STORY: Final[Mapping[str, str]] = {
     "answer": "Is Eq. 8 right?",
     "live": "Throw it yourself",
     "bottles": "Other bottles",
-    "survives": "What survives",
+    "survives": "What holds, and what does not",
     "sure": "How sure we are",
 }
 """Screen of the story -> its name in the contents, in the order of the page."""
