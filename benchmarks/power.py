@@ -32,6 +32,7 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
     "first": patches("first"),
     "second": patches("second"),
     "third": patches("third"),
+    "fourth": patches("fourth"),
     "right": dict(RIGHT),
 }
 """Mistakes by list and name, and solvers without one."""
