@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -182,6 +183,7 @@ FLOORS = (
 """Rooms of the report package from the ground up: a file imports from its own floor and from those below."""
 
 
+@cache
 def imports_by_module() -> dict[str, set[str]]:
     """Return which files of the product every file of it imports, also inside functions; types alone not counted."""
     modules = {}

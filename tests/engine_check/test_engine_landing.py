@@ -98,16 +98,13 @@ def flown(seed, **changes):
             return start
 
 
+@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 8))])
 @pytest.mark.parametrize("frozen", [False, True])
-def test_one_touch_has_one_outcome(frozen):
-    outcomes = []
-    for seed in range(5):
-        start = flown(seed, frozen=frozen)
-        one = ode_reference.land(start, FLAT)
-        other = engine_check.land(start, FLAT, dt=STEP)
-        assert one.decided
-        outcomes.append((one.outcome, other.outcome if other.decided else one.outcome))
-    assert all(one == other for one, other in outcomes)
+def test_one_touch_has_one_outcome(frozen, seed):
+    start = flown(seed, frozen=frozen)
+    one, other = ode_reference.land(start, FLAT), engine_check.land(start, FLAT, dt=STEP)
+    assert one.decided
+    assert other.outcome in (one.outcome, "undecided")
 
 
 STACK = Touch(
@@ -141,8 +138,12 @@ def test_a_stack_on_the_base_throws_back_what_strikes_it_as_in_the_reference():
     assert motion.v[k, 3] == pytest.approx(-1.5, abs=0.01)
 
 
-def test_an_outcome_that_hangs_on_an_atom_s_width_is_certified_by_nobody():
+def test_an_outcome_that_hangs_on_an_atom_s_width_is_not_certified_by_the_reference():
     assert "instead of" in ode_reference.land(STACK, BOUNCY).reason
+
+
+@pytest.mark.slow
+def test_an_outcome_that_hangs_on_an_atom_s_width_is_not_certified_by_the_engine():
     assert "touch within 1e-06 L" in engine_check.land(STACK, BOUNCY, dt=4e-5).reason
 
 
@@ -206,8 +207,9 @@ def test_an_outcome_is_certified_if_half_the_step_and_the_twins_end_alike(monkey
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("beside", [(-2e-3, 2e-3), pytest.param((-0.03, 0.04), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", ["together", "in-turn"])
-def test_near_an_edge_between_outcomes_the_engine_certifies_nothing_false(law):
+def test_near_an_edge_between_outcomes_the_engine_certifies_nothing_false(law, beside):
     """Certificates 2e-3 to 0.04 of omega beside the edge of the event-driven landing; at it, none at all."""
     start = flown(3)
 
@@ -221,7 +223,7 @@ def test_near_an_edge_between_outcomes_the_engine_certifies_nothing_false(law):
     for _ in range(5):
         middle = (low + high) / 2
         low, high = (middle, high) if truth(middle) == ends[k] else (low, middle)
-    for factor in (low - 0.03, low - 2e-3, high + 2e-3, high + 0.04):
+    for factor in (low + beside[0], high + beside[1]):
         result = engine_check.land(replace(start, omega=factor * start.omega), FLAT, dt=STEP, law=law)
         assert result.outcome in (truth(factor), "undecided")
     assert not engine_check.land(replace(start, omega=middle * start.omega), FLAT, dt=STEP, law=law).decided

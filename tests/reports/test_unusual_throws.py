@@ -28,11 +28,11 @@ UNUSUAL = {
     "weightless, other spin": {"gravity": 0.0, "omega0": -20.0},
     "elastic": {"restitution": 1.0, "drag": 0.0},
     "full": {"water_mass": 1.0},
-    "elastic and full": {"restitution": 1.0, "drag": 0.0, "water_mass": 1.0},
+    "all of these": {"gravity": 0.0, "omega0": -20.0, "restitution": 1.0, "drag": 0.0, "water_mass": 1.0},
 }
 
 
-TOGETHER = ("elastic", "full")
+TOGETHER = ("weightless, other spin", "elastic", "full")
 """What a push throws together, and alone only among the long forms."""
 
 
