@@ -130,8 +130,8 @@ def build(out: Path, report: Path | None = None) -> None:
     reference.build(out / "reference")
     has = {"report": report is not None, "lesson": lesson_page.bring_python(out)}
     if has["lesson"]:
-        page = site_page("A lesson without installation", lesson_page.body(), "", **has)
-        (out / "lesson.html").write_text(page, encoding="utf-8")
+        text = site_page("A lesson without installation", lesson_page.body(), "", **has)
+        (out / "lesson.html").write_text(text, encoding="utf-8")
     else:
         sys.stderr.write(f"no lesson in the browser: first run  {lesson_page.INSTALL}\n")
     for file in PAGES:
