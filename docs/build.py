@@ -3,6 +3,8 @@
     python docs/build.py --out site [--report DIR]        (needs the extra "docs")
 
 Without --report the site links to no report; with it the folder of a finished report is copied into the site.
+The lesson in the browser needs Python for WebAssembly, ``npm ci --prefix docs/lesson``; without it the
+site has no such lesson.
 """
 
 from __future__ import annotations
@@ -11,8 +13,10 @@ import argparse
 import html
 import re
 import shutil
+import sys
 from pathlib import Path
 
+import lesson_page
 import reference
 
 HERE = Path(__file__).resolve().parent
@@ -74,8 +78,8 @@ def is_formula(block: str) -> bool:
     )
 
 
-def page_of(path: Path, current: str, report: bool) -> str:
-    """Return one page of the site."""
+def page_of(path: Path, current: str, *, report: bool, lesson: bool) -> str:
+    """Return one page of the site; `report` and `lesson` say what else the site holds."""
     import markdown2
 
     text = path.read_text(encoding="utf-8").replace("](../", "](")
@@ -84,17 +88,23 @@ def page_of(path: Path, current: str, report: bool) -> str:
     )
     made = str(markdown2.markdown(text, extras=["tables", "fenced-code-blocks", "header-ids"]))
     made = re.sub(r"<pre><code>(.*?)</code></pre>", lambda found: _block(found.group(1)), made, flags=re.DOTALL)
+    return site_page(PAGES[current], made, current, report=report, lesson=lesson)
+
+
+def site_page(name: str, body: str, current: str, *, report: bool, lesson: bool) -> str:
+    """Return a page of the site with its contents beside it."""
     links = "".join(
         f'<li><a href="{Path(file).stem}.html"{" aria-current=page" if file == current else ""}>{name}</a></li>'
         for file, name in PAGES.items()
     )
     links += '<li><a href="reference/index.html">Reference</a></li>'
+    links += '<li><a href="lesson.html">A lesson without installation</a></li>' if lesson else ""
     links += '<li><a href="report/index.html">Example report</a></li>' if report else ""
     return (
         '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
-        f"<title>flipproof: {PAGES[current]}</title><style>{STYLE}</style></head><body><div class=all>"
-        f"<nav aria-label=Contents><ul>{links}</ul></nav><main>{made}</main></div></body></html>\n"
+        f"<title>flipproof: {name}</title><style>{STYLE}</style></head><body><div class=all>"
+        f"<nav aria-label=Contents><ul>{links}</ul></nav><main>{body}</main></div></body></html>\n"
     )
 
 
@@ -118,9 +128,15 @@ def build(out: Path, report: Path | None = None) -> None:
     """Write the site into a folder."""
     out.mkdir(parents=True, exist_ok=True)
     reference.build(out / "reference")
+    has = {"report": report is not None, "lesson": lesson_page.bring_python(out)}
+    if has["lesson"]:
+        text = site_page("A lesson without installation", lesson_page.body(), "", **has)
+        (out / "lesson.html").write_text(text, encoding="utf-8")
+    else:
+        sys.stderr.write(f"no lesson in the browser: first run  {lesson_page.INSTALL}\n")
     for file in PAGES:
         target = out / f"{Path(file).stem}.html"
-        target.write_text(page_of(ROOT / file, file, report is not None), encoding="utf-8")
+        target.write_text(page_of(ROOT / file, file, **has), encoding="utf-8")
     shutil.copyfile(out / "README.html", out / "index.html")
     for picture in HERE.glob("*.svg"):
         shutil.copyfile(picture, out / picture.name)

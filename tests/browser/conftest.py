@@ -1,11 +1,14 @@
 """The report in a real, headless Chromium.
 
-Chromium comes from the system, axe-core from ``npm ci`` in this folder. Where either is missing the tests that need it
-are skipped with the reason, unless FLIPPROOF_BROWSER=require: then they fail.
+Chromium comes from the system, axe-core from ``npm ci`` in this folder, Pyodide from ``npm ci --prefix docs/lesson``.
+Where one is missing the tests that need it are skipped with the reason, unless FLIPPROOF_BROWSER=require:
+then they fail.
 """
 
 import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -67,6 +70,18 @@ def folder(request, tmp_path_factory) -> Path:
     made = tmp_path_factory.mktemp("report")
     write(report, made)
     return made
+
+
+@pytest.fixture(scope="session")
+def site(request, tmp_path_factory) -> Path:
+    """Return the site of the documents, with the lesson in the browser."""
+    request.getfixturevalue("chromium")
+    docs = HERE.parent.parent / "docs"
+    if not (docs / "lesson" / "node_modules" / "pyodide").is_dir():
+        unavailable("no Pyodide: run npm ci --prefix docs/lesson")
+    out = tmp_path_factory.mktemp("site")
+    subprocess.run([sys.executable, str(docs / "build.py"), "--out", str(out)], check=True)
+    return out
 
 
 @dataclass
