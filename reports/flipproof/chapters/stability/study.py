@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from flipproof.chapters.differences.study import largest_change
 from flipproof.chapters.maps.study import vary
+from flipproof.curves.ensemble import largest_change
 from flipproof.frame.flights import Call, attempt
 from flipproof.frame.solvers import Made, Run
 from flipproof.frame.twins import omega_band_call
