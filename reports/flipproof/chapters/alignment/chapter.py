@@ -18,8 +18,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
-from flipproof.curves.events import closest
+from flipproof.curves.events import IndexArray, closest
 from flipproof.curves.tube import Held, hold
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed
@@ -102,17 +103,17 @@ def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
             rows += [(i, end, times[at], np.nan) for at in np.setdiff1d(mine, j) if not unsure[at]]
             rows += [(i, end, np.nan, others[at]) for at in np.setdiff1d(its, k) if not other_unsure[at]]
     rows.sort(key=lambda row: float(np.nanmin(row[2:])))
-    table = np.rec.fromrecords(rows or np.empty((0, 4)), formats="i8,i8,f8,f8", names="slice,end,first,second")
+    columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     return Alignment(
         names=(first.label, second.label),
         n_slices=first.scenario.n_slices,
         until=until,
-        impacts=table,
+        impacts=np.rec.fromarrays(columns, formats="i8,i8,f8,f8", names="slice,end,first,second"),
         rests=(rest_intervals(first), rest_intervals(second)),
     )
 
 
-def _fast_impacts(run: Trajectory, until: float) -> tuple[FloatArray, ...]:
+def _fast_impacts(run: Trajectory, until: float) -> tuple[FloatArray, IndexArray, NDArray[np.bool_]]:
     """Return time [s] and (slice, end) of the impacts up to the common end, and which prove nothing when alone."""
     impacts = run.impacts
     if impacts is None:

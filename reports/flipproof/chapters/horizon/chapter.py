@@ -44,6 +44,9 @@ OWN: Final = ("eq8", FREE)
 OWN_SIZE: Final = 1e-9
 """Change of the release of the report's own throw: of theta_0 in rad and, at once, of omega_0 as a fraction."""
 
+LINES: Final = ("-", (0, (5, 2)), (0, (3, 1.5, 1, 1.5)), (0, (1, 1.5)))
+"""Styles of the lines by size of the change."""
+
 LEAST: Final = 1e-16
 """Width below which none is drawn."""
 
@@ -163,7 +166,10 @@ def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
 
 def study_horizon(solver: str, own: bool, levels: Sequence[Level], flights: Flights) -> Horizon:
     """Read the ensembles of a solver; one that could not be run, as an engine that is not installed, has none."""
-    tried = [(level, attempt(lambda runs: Ensemble.of(*flights.levels([runs]), BAND), level.runs)) for level in levels]
+    tried = [
+        (level, attempt(lambda runs: Ensemble.of([flights[run].flight for run in runs], BAND), level.runs))
+        for level in levels
+    ]
     return Horizon(
         solver=solver,
         own=own,
@@ -261,7 +267,7 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
     size = (8.0, 1.2 + 2.6 * rows)
     figure, grid = new_figure(rows, columns, size=size, sharex=True, sharey=True, squeeze=False)
     sizes = sorted({level.size for study in studies for level, _ in study.ensembles if level.kind != "order"})
-    lines = dict(zip(sizes, cycle(("-", (0, (5, 2)), (0, (3, 1.5, 1, 1.5)), (0, (1, 1.5)))), strict=False))
+    lines: dict[float, Any] = dict(zip(sizes, cycle(LINES), strict=False))
     for axes, study in zip(grid.flat, studies, strict=False):
         axes.axhline(BAND, color=red, linewidth=1.2, linestyle=":")
         axes.set_yscale("log")
