@@ -14,7 +14,7 @@ from flipproof.build import ask_of
 from flipproof.chapters import parts
 from flipproof.chapters.horizon.chapter import Reach
 from flipproof.chapters.overlap.chapter import Amount
-from flipproof.chapters.stability.study import Layout
+from flipproof.chapters.stability.chapter import Layout
 from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
 from flipproof.check.diff_page import read_curves
 from flipproof.check.report_pair import differences, figure_report_pair

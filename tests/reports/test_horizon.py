@@ -1,4 +1,4 @@
-"""Ensembles whose width is known, the order of the bodies, and a small real horizon."""
+"""The plan of the ensembles, what is read from them, the order of the bodies, and a small real horizon."""
 
 import math
 from dataclasses import replace
@@ -10,158 +10,164 @@ from made_up import trajectory_of
 from engine_check import PymunkKnobs
 from engine_check.pymunk_settings import insertion_order
 from engine_check.pymunk_world import build
+from flipproof.build import ask_of
 from flipproof.chapters.horizon.chapter import (
+    OWN_SIZE,
     Reach,
+    claim_amplification,
     claim_angle,
     claim_horizon,
     claims,
     figure_horizon,
     figures,
     plan_horizon,
-    study_ensemble,
+    plan_own,
     study_horizon,
 )
+from flipproof.frame.flights import Flights
 from flipproof.frame.solvers import Made, make, solve
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 THROW = Scenario(duration=0.1)
 SMALL = Reach(solvers=("pymunk", "free-flight"), sizes=(1e-9, 1e-6), seeds=(1, 2), slices=5)
 T = np.linspace(0.0, 0.1, 251)
+OWN = ask_of(THROW.with_slices(3), "quick").solvers["free-flight"]
 
 
-def flight(change, *, points=None, status="ok") -> Trajectory:
-    """Return a run with omega = omega_0 (1 + change)."""
-    omega = 20.0 * (1.0 + np.broadcast_to(change, T.shape)[:points])
-    return trajectory_of(THROW, T[:points], omega=omega, status=status)
+def plans(reach=SMALL):
+    return {name: plan_horizon(THROW, name, reach) for name in reach.solvers}
 
 
-def ensemble(*members):
-    return study_ensemble("angle", 1e-6, members)
-
-
-def planned(reach=SMALL):
+def runs_of(levels):
     """Return every run that is planned, each once."""
-    levels = [level for each in plan_horizon(THROW, reach).values() for level in each]
     return list(dict.fromkeys(run for level in levels for run in level.runs))
 
 
 def made_up(change_of, spoil=None):
-    """Study flights whose change is ``change_of(tag)``; ``spoil`` maps tags to what became of them instead."""
-    made = {run: Made(run, flight(change_of(run.label)), 0.0) for run in planned()}
-    return study_horizon(plan_horizon(THROW, SMALL), made | (spoil or {}))
+    """Study flights with omega = omega_0 (1 + ``change_of(label)``); ``spoil`` maps runs to what became of them."""
+
+    def flight(run):
+        omega = 20.0 * (1.0 + np.broadcast_to(change_of(run.label), T.shape))
+        return Made(run, trajectory_of(THROW.with_slices(5), T, omega=omega), 0.0)
+
+    studies = []
+    for solver, levels in plans().items():
+        flights = Flights({run: flight(run) for run in runs_of(levels)} | (spoil or {}))
+        studies.append(study_horizon(solver, False, levels, flights))
+    return studies
 
 
-def test_the_width_is_that_of_the_whole_ensemble_and_has_its_rate_and_horizon():
-    growing = 1e-6 * np.exp(100 * np.minimum(T, 0.07))  # what comes after the horizon has no part in the rate
-    found = ensemble(flight(0.0), flight(growing), flight(-growing))
-    assert found.width == pytest.approx(2 * growing, rel=1e-6, abs=0.0)
-    assert found.horizon == pytest.approx(math.log(1e-3 / 2e-6) / 100, abs=1e-4)
-    assert found.growth.rate == pytest.approx(100, rel=1e-3, abs=0.0)
-    assert found.largest == found.width[-1] == pytest.approx(2e-6 * math.exp(7))
-    assert "beyond 0.001 from 62." in found.words
-
-
-def test_members_on_the_same_side_do_not_widen_the_ensemble_twice():
-    assert ensemble(flight(0.0), flight(1e-4), flight(5e-5)).largest == pytest.approx(1e-4)
-
-
-def test_an_ensemble_that_stays_together_has_no_horizon():
-    found = ensemble(flight(0.0), flight(0.0))
-    assert found.horizon is None
-    assert found.largest == 0.0
-    assert "no growth rate" in found.words
-
-
-def test_a_member_that_ends_is_a_horizon_and_not_a_cut():
-    found = ensemble(flight(0.0), flight(1e-6, points=101, status="diverged"))
-    assert len(found.t) == len(T)
-    assert found.horizon == found.ended == pytest.approx(T[100])
-    assert np.isinf(found.width[101:]).all()
-    assert np.isinf(found.largest)
-    assert "a member ends at 40.0 ms" in found.words
-    both = ensemble(*(flight(0.0, points=101, status="diverged") for _ in range(2)))
-    assert both.ended == pytest.approx(T[100])
+def of_kind(study, kind):
+    return [ensemble for level, ensemble in study.ensembles if level.kind == kind]
 
 
 @pytest.mark.parametrize("reach", [Reach(), SMALL])
 def test_the_plan_changes_one_thing_at_a_time(reach):
-    runs = planned(reach)
-    assert len({run.label for run in runs}) == len(runs)
-    base = {run.solver: run for run in runs if run.label.endswith("as it is")}
-    assert tuple(base) == reach.solvers
-    for run in runs:
-        usual = base[run.solver]
-        turned = run.scenario.theta0 - usual.scenario.theta0
-        changed = {name for name in run.settings if run.settings[name] is not usual.settings.get(name)} - {"times"}
-        if "angle" in run.label:
-            assert turned == pytest.approx(float(run.label.split()[-1]), rel=1e-6, abs=0.0)
-            assert min(abs(abs(turned) / size - 1) for size in reach.sizes) < 1e-6
-            assert run.scenario == replace(usual.scenario, theta0=run.scenario.theta0)
-        if "order" in run.label:
-            assert run.scenario == usual.scenario
-            assert run.settings["shuffle"] in reach.seeds
-        assert changed <= ({"shuffle"} if "order" in run.label else set())
-    for run in (run for run in runs if run.solver == "pymunk"):
-        assert run.settings["dt"] == 2e-4
-        assert run.settings["iterations"] >= 50
-    assert all("iterations" not in run.settings for run in runs if run.solver != "pymunk")
+    for solver, levels in plans(reach).items():
+        runs = runs_of(levels)
+        assert len({run.label for run in runs}) == len(runs)
+        usual = runs[0]
+        assert [level.runs[0] for level in levels] == [usual] * len(levels)
+        for level in levels:
+            for run in level.runs[1:]:
+                turned = run.scenario.theta0 - usual.scenario.theta0
+                changed = {name for name, value in run.settings.items() if value is not usual.settings.get(name)}
+                assert changed == ({"shuffle"} if level.kind == "order" else set())
+                if level.kind == "order":
+                    assert run.scenario == usual.scenario
+                    continue
+                assert abs(turned) == pytest.approx(level.size, rel=1e-6, abs=0.0)
+                spun = run.scenario.omega0 / usual.scenario.omega0 - 1
+                expected = turned if level.kind == "release" else 0.0
+                assert spun == pytest.approx(expected, rel=1e-6, abs=1e-15)
+        if solver == "pymunk":
+            assert usual.settings["dt"] == 2e-4
+            assert usual.settings["iterations"] >= 50
+            assert levels[-1].kind == "order"
+        else:
+            assert "iterations" not in usual.settings
+
+
+def test_the_own_throw_is_released_faster_and_slower():
+    (level,) = plan_own(OWN)
+    base, *others = (run.scenario for run in level.runs)
+    changes = [(at.theta0 - base.theta0, at.omega0 / base.omega0 - 1) for at in others]
+    assert np.abs(changes) == pytest.approx(OWN_SIZE, rel=1e-6, abs=0.0)
+    assert [tuple(np.sign(pair)) for pair in changes] == [(1, 1), (-1, -1)]
+    assert {run.settings.get("times") for run in level.runs} == {None}
+
+
+def test_the_amplification_is_the_largest_change_over_what_is_left_of_the_size():
+    levels = plan_own(OWN)
+    changes = (0.0, 3e-7, -5e-7)
+    flights = {
+        run: Made(run, trajectory_of(OWN.scenario, T, omega=20.0 * (1 + change)), 0.0)
+        for run, change in zip(levels[0].runs, changes, strict=True)
+    }
+    found = claim_amplification(study_horizon("free-flight", True, levels, Flights(flights)))
+    assert found.id == "predictability-free-flight"
+    assert found.value == pytest.approx(500.0, rel=1e-5, abs=0.0)
+    lost = flights | {levels[0].runs[1]: Made(levels[0].runs[1], None, 0.0, "MemoryError: too much")}
+    found = claim_amplification(study_horizon("free-flight", True, levels, Flights(lost)))
+    assert (found.value, found.failed) == (None, False)
+    assert "MemoryError" in found.note
 
 
 def test_every_ensemble_is_read_from_its_own_runs():
-    levels = {"angle -1e-06": 1e-5, "angle +1e-09": 2e-5, "changed by 1e-06": 3e-5, "order 2": 4e-5, "as it is": 0.0}
-    studies = made_up(lambda tag: next((level for words, level in levels.items() if words in tag), 0.0))
-    engine, equation = studies
-    assert [(e.kind, e.size) for e in equation.ensembles] == [
+    levels = {"angle -1e-06": 1e-5, "angle +1e-09": 2e-5, "release +1e-06": 3e-5, "order 2": 4e-5}
+    engine, equation = made_up(lambda label: next((size for words, size in levels.items() if words in label), 0.0))
+    assert [(level.kind, level.size) for level, _ in equation.ensembles] == [
         ("angle", 1e-9), ("angle", 1e-6), ("release", 1e-9), ("release", 1e-6),
     ]  # fmt: skip
-    widths = {(e.kind, e.size): e.largest for e in engine.ensembles if e.kind != "order"}
-    assert widths[("angle", 1e-6)] == pytest.approx(1e-5)
-    assert widths[("angle", 1e-9)] == pytest.approx(2e-5)
-    assert widths[("release", 1e-6)] == pytest.approx(3e-5)
-    assert widths[("release", 1e-9)] == 0.0
-    (order,) = engine.of_kind("order")
-    assert (order.largest, order.members) == (pytest.approx(4e-5), 3)
-    assert engine.widest() is order
+    assert [each.largest for each in of_kind(engine, "angle")] == pytest.approx([2e-5, 1e-5])
+    assert [each.largest for each in of_kind(engine, "release")] == pytest.approx([0.0, 3e-5])
+    (order,) = of_kind(engine, "order")
+    assert order.largest == pytest.approx(4e-5)
+    assert engine.widest()[1] is order
     assert engine.horizon is None
     assert claim_angle(engine).failed  # 2e-5 of omega_0 for another angle is not arithmetic
     assert claim_horizon(engine).value == pytest.approx(4e-5)
-    found = {finding.id: finding for finding in claims(studies)}
+    found = {finding.id: finding for finding in claims((engine, equation))}
     assert found["horizon-order-pymunk"].value == pytest.approx(4e-5)
     assert "horizon-order-free-flight" not in found
 
 
 def test_a_solver_that_did_not_run_stays_with_its_reason():
-    named = {run.label: run for run in planned()}
+    named = {run.label: run for run in runs_of(plans()["pymunk"])}
     run, member = named["horizon, pymunk, as it is"], named["horizon, pymunk, angle +1e-06"]
     engine, equation = made_up(lambda _: 0.0, {run: Made(run, None, 0.0, "RuntimeError: not installed")})
     assert (engine.ensembles, engine.widest(), engine.horizon) == ((), None, None)
-    assert "not installed" in engine.words
     assert claim_horizon(engine).verdict == claim_angle(engine).verdict == "not evaluated"
     assert not claim_angle(engine).failed
     assert engine.problems == ("horizon, pymunk, as it is: RuntimeError: not installed",)
     (exhibit,) = figures((engine, equation))
-    assert "pymunk was not run" in exhibit.caption
-    legend = [text.get_text() for text in figure_horizon([engine, equation]).legends[0].get_texts()]
-    assert "pymunk: not run" in legend
+    assert "pymunk was not run" in exhibit.alt
     engine, _ = made_up(lambda _: 0.0, {member: Made(member, None, 0.0, "MemoryError: too much")})
-    assert [(e.kind, e.size) for e in engine.ensembles if e.kind == "angle"] == [("angle", 1e-9)]
+    assert [level.size for level, _ in engine.ensembles if level.kind == "angle"] == [1e-9]
     assert "MemoryError" in engine.problems[0]
+    spoil = {
+        run: Made(run, None, 0.0, "x") for level in plans()["pymunk"] if level.kind == "angle" for run in level.runs[1:]
+    }
+    assert claim_angle(made_up(lambda _: 0.0, spoil)[0]).failed
     assert list(figures((replace(engine, ensembles=()),))) == []
 
 
 def test_the_figure_labels_band_sizes_and_horizons():
     steep = 1e-6 * np.exp(100 * T)
-    engine, equation = made_up(lambda tag: steep if "changed by 1e-06" in tag or "order" in tag else 0.0)
-    figure = figure_horizon([engine, equation])
-    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == ["pymunk", "free-flight"]
+    studies = made_up(lambda label: steep if "release +1e-06" in label or "order" in label else 0.0)
+    studies.append(replace(studies[1], own=True))
+    figure = figure_horizon([*studies, studies[1]])
+    assert [axes.get_title(loc="left") for axes in figure.axes[:3]] == [
+        "pymunk",
+        "free-flight",
+        "free-flight, this throw",
+    ]
     assert {axes.get_yscale() for axes in figure.axes} == {"log"}
-    assert "band 0.001" in [text.get_text() for text in figure.axes[0].texts]
-    assert "exactly 0" in [text.get_text() for text in figure.axes[1].texts]
-    assert figure.axes[2].get_xlabel() == "time t [s]"
+    assert all(axes.get_xlabel() == "time t [s]" for axes in figure.axes[1:])
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert {"change of 1e-09", "change of 1e-06", "other orders of the bodies", "horizon: band left"} <= set(legend)
-    (exhibit,) = figures((engine, equation))
-    assert "beyond the band first at 69 ms" in exhibit.caption
+    assert {"change of 1e-09", "change of 1e-06", "band 0.001", "horizon"} == set(legend)
+    (exhibit,) = figures(tuple(studies))
+    assert "beyond 0.001 from 69.1 ms" in exhibit.alt
     assert "ω₀" not in exhibit.alt
     assert exhibit.drawing.png.startswith(b"\x89PNG")
 
@@ -207,13 +213,23 @@ def test_an_impossible_seed_is_refused(seed):
 
 
 def test_free_flight_does_not_feel_the_angle_and_the_engine_only_by_arithmetic():
-    engine, equation = study_horizon(plan_horizon(THROW, SMALL), {run: make(run) for run in planned()})
-    assert not engine.problems
-    assert not equation.problems
-    for study in (engine, equation):
+    studies = []
+    for solver, levels in plans().items():
+        studies.append(study_horizon(solver, False, levels, Flights({run: make(run) for run in runs_of(levels)})))
+    for study in studies:
+        assert not study.problems
         assert claim_angle(study).verdict == "pass"
-        for found, size in zip(study.of_kind("release"), SMALL.sizes, strict=True):
+        for found, size in zip(of_kind(study, "release"), SMALL.sizes, strict=True):
             assert found.width[0] == pytest.approx(2 * size, rel=1e-5, abs=0.0)
-    assert equation.of_kind("angle")[1].largest < 1e-13
-    (order,) = engine.of_kind("order")
+    engine, equation = studies
+    assert of_kind(equation, "angle")[1].largest < 1e-13
+    (order,) = of_kind(engine, "order")
     assert 0.0 < order.largest < 1e-4
+
+
+def test_eq8_is_smooth_and_ice_amplifies_nothing():
+    for solver, throw, most in (("eq8", Scenario().with_slices(8), 100), ("midpoint", Scenario(frozen=True), 1.001)):
+        levels = plan_own(replace(OWN, solver=solver, scenario=throw, settings={}))
+        study = study_horizon(solver, True, levels, Flights({run: make(run) for run in runs_of(levels)}))
+        assert study.horizon is None
+        assert 0.999 < claim_amplification(study).value < most

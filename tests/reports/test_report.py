@@ -63,7 +63,7 @@ def test_every_claim_is_evaluated_and_holds(gathered):
     for needed in (
         "ice-exact-step", "ice-eq8", "ice-pymunk-rigid", "ice-welded-order", "vectors-python_default",
         "vectors-matlab_default", "order-exact-step-across-impacts", "order-published-python-before-the-first-impact",
-        "reference-eq8", "reference-free-flight", "engine-gravity", "engine-default-iterations", "energy-free-flight",
+        "reference-eq8", "reference-free-flight", "engine-gravity", "engine-default-explodes", "energy-free-flight",
         "waterfall-plateau", "model-form-exact-step-eq8", "predictability-free-flight",
     ):  # fmt: skip
         assert needed in ids

@@ -10,7 +10,7 @@ from made_up import trajectory_of
 
 from flipproof.build import ask_of
 from flipproof.chapters.differences.chapter import band_calls, run_bands
-from flipproof.chapters.differences.study import largest_change, study_difference
+from flipproof.chapters.differences.study import study_difference
 from flipproof.chapters.engine_facts.chapter import claim_gravity_cancels
 from flipproof.chapters.ice.chapter import measure
 from flipproof.chapters.reference.chapter import claim_reference_converged, claim_second_method
@@ -22,6 +22,7 @@ from flipproof.chapters.step_size.chapter import (
     plan_step_size,
     study_step_size,
 )
+from flipproof.curves.ensemble import largest_change
 from flipproof.curves.growth import first_crossing
 from flipproof.curves.order import observed_order
 from flipproof.frame.findings import Band, Finding

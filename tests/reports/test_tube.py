@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_up import trajectory_of
 
-from flipproof.chapters.alignment.study import study_tube
+from flipproof.chapters.alignment.chapter import study_tube
+from flipproof.curves import tube as tubes
 from flipproof.curves.tube import tube_around
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 T = np.linspace(0.0, 0.5, 501)
 
@@ -17,12 +18,8 @@ def sawtooth(t, early=0.0):
     return ((t + early) * 10) % 1.0
 
 
-def run(values, t=T) -> Trajectory:
-    return trajectory_of(Scenario(n_slices=2), t, omega=values)
-
-
 def hold(values, t=T, dt=0.003, dy=0.01, reference=None):
-    return study_tube(run(sawtooth(T) if reference is None else reference), run(values, t), dt=dt, dy=dy)
+    return tubes.hold(T, sawtooth(T) if reference is None else reference, t, values, dt=dt, dy=dy)
 
 
 def test_an_early_bounce_passes_where_a_pointwise_comparison_fails():
@@ -59,7 +56,8 @@ def test_a_run_that_ends_early_is_outside_from_there():
     assert tube.first_exit == pytest.approx(0.2)
     assert tube.share == pytest.approx(0.4, abs=0.01)
     assert tube.largest == 0.0
-    assert "ends at 200.0 ms" in tube.words
+    whole, short = (trajectory_of(Scenario(n_slices=2), t, omega=sawtooth(t)) for t in (T, T[:201]))
+    assert "ends at 200.0 ms" in study_tube(whole, short)[1]
 
 
 def test_other_times_do_not_matter_and_what_the_reference_does_not_reach_is_not_judged():

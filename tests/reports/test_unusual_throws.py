@@ -7,18 +7,20 @@ import pytest
 
 from flipproof.build import ask_of, build, gather_report
 from flipproof.chapters import parts
+from flipproof.chapters.horizon.chapter import Reach
 from flipproof.chapters.overlap.chapter import Amount
 from flipproof.frame.pool import SerialExecutor
 from flipproof.output.provenance import provenance
 from slicemodel import Scenario
 
 SMALL = {
+    "horizon": Reach(solvers=()),
     "overlap": Amount(fills=(0.5, 1.0), slices=3, dt=4e-4),
     "waterfall": 4,
 }
 """What does not depend on the throw is tried elsewhere; here it is only as large as its claims need."""
 
-WITHOUT = ("engine-facts", "exact-cases", "horizon", "reference", "stability", "vectors")
+WITHOUT = ("engine-facts", "exact-cases", "reference", "stability", "vectors")
 """What does not depend on the throw at all."""
 
 UNUSUAL = {

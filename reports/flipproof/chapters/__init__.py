@@ -23,7 +23,7 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
      ("finite_step", "step_size", "frozen", "model_form")),
     ("slices", "How many slices", "How far the numbers move when the water is cut into more slices.", ("slices",)),
     ("events", "Impacts", "When slices hit the ends in each solver, which impacts correspond, and how a small change "
-     "of the release grows.", ("alignment", "predictability")),
+     "of the release grows.", ("alignment", "horizon")),
     ("energy", "Energy", "Where the energy of the flight goes, and whether the energy ledger of every equation closes.",
      ("energy",)),
     ("checks", "Whether the programs are right",
@@ -32,7 +32,7 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("ice", "Frozen water", "Ice cannot slide, so ω must stay constant: how closely every solver keeps it.", ("ice",)),
     ("engines", "The engines",
      "What each physics engine computes by itself, how far its result can be trusted, and where it fails.",
-     ("certificates", "agreement", "stability", "engine_facts", "horizon", "overlap")),
+     ("certificates", "agreement", "stability", "engine_facts", "overlap")),
     ("water", "Which equation comes nearest to water",
      "Every equation beside three crude fluids in the same bottle, by filling, and what may be concluded.", ("water",)),
     ("landing", "Does it stand?",

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,40 +72,3 @@ def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None
         return float(t[0])
     share = (band - size[k - 1]) / (size[k] - size[k - 1])
     return float(t[k - 1] + share * (t[k] - t[k - 1]))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
-    """How far curves that should be one curve come apart.
-
-    Parameters
-    ----------
-    t, width : (P,) - times [s] and width; infinite where a curve has ended
-    horizon : first time the width exceeds the band [s]; None: never
-    ended : where the first curve ends, if that is early [s]
-    """
-
-    t: FloatArray
-    width: FloatArray
-    horizon: float | None
-    ended: float | None
-
-    @classmethod
-    def of(cls, t: FloatArray, width: FloatArray, band: float, **more: Any) -> Self:
-        """Return the spread with its horizon; ``more`` are the other fields."""
-        return cls(t=t, width=width, horizon=first_crossing(t, width, band), **more)
-
-    @property
-    def growth(self) -> Growth:
-        """Growth of the width up to the horizon, fitted when it is asked for."""
-        return fit_growth(self.t, self.width, stop=math.inf if self.horizon is None else self.horizon)
-
-    @property
-    def largest(self) -> float:
-        """Largest width; infinite if a curve has ended early."""
-        return float(self.width.max())
-
-
-def earliest_horizon(spreads: Iterable[Spread]) -> float | None:
-    """Return the earliest horizon of several spreads [s]; None: there is none up to the end."""
-    return min((spread.horizon for spread in spreads if spread.horizon is not None), default=None)

@@ -1,8 +1,16 @@
-"""Events: the impacts of two flights side by side, and one curve in the tube around the other."""
+"""Events: the contacts and impacts of two flights side by side, and one omega(t) in the tube around the other.
+
+Impacts of a slice on an end are matched in order, with the smallest sum of shifts; two that lie within ``SHIFT`` of
+each other are one impact of both flights, every other is one flight's alone. Near rest a slice bounces infinitely
+often, and every solver ends that tail somewhere else: impacts slower than ``MIN_SPEED`` are left out, and so are lone
+ones below twice that, whose partner may just have been left out, or so near the end that it may just be cut off.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -10,50 +18,166 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
-from flipproof.chapters.alignment.study import SHIFT_BAND, Alignment, Table, Tube, end_name, study_alignment, study_tube
+from flipproof.curves.events import IndexArray, closest
+from flipproof.curves.tube import Held, hold
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed
+from flipproof.frame.solvers import Missing
 from flipproof.output.columns import rows_csv
-from slicemodel.trajectory import BASE, CAP
+from slicemodel import Trajectory
+from slicemodel.trajectory import BASE, CAP, FloatArray
 
 PAIRS: Final = (("eq8", "midpoint"), ("eq8", "free-flight"))
 """Pairs whose impact sequences are aligned: two ways to the same equation, and two equations."""
 
-LANES = 0.2, -0.2
-END_COLOURS = {BASE: "#0072B2", CAP: "#E69F00"}
-SHIFTED = "#009E73"
+SHIFT: Final = 1e-3
+"""Impacts further apart in time than this are two impacts [s]."""
 
-Pairs = Mapping[tuple[str, str], tuple[Outcome[Alignment], Outcome[Tube]]]
+MIN_SPEED: Final = 1e-2
+"""Slower impacts are the tail of a slice that comes to rest [m/s]."""
+
+TUBE: Final = 2e-3, 0.01
+"""Half widths of the tube: in time [s], and in omega as a fraction of omega_0."""
+
+LANES: Final = 0.2, -0.2
+END_COLOURS: Final = {BASE: "#0072B2", CAP: "#E69F00"}
+END_NAMES: Final = {BASE: "base", CAP: "cap"}
+MARKS: Final = "v^"
+
+Table = Any
+"""A NumPy record array: rows with named columns, such as ``impacts.slice``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Alignment:
+    """The impacts of two runs of one throw, up to the end of the shorter one.
+
+    Parameters
+    ----------
+    names : labels of the runs
+    until : common end of the two runs [s]
+    impacts : in order of time; slice (from 0), end (+1 base, -1 cap), and its times in the first and the second run
+        [s], NaN in a run that does not have it
+    rests : contacts of each run: slice, end, start, stop [s]; empty for a run without slice paths
+    """
+
+    names: tuple[str, str]
+    n_slices: int
+    until: float
+    impacts: Table
+    rests: tuple[Table, Table]
+
+    @property
+    def kinds(self) -> tuple[Table, Table, Table]:
+        """The impacts of both runs, of the first alone, and of the second alone."""
+        first, second = np.isfinite(self.impacts.first), np.isfinite(self.impacts.second)
+        return self.impacts[first & second], self.impacts[~second], self.impacts[~first]
+
+    @property
+    def words(self) -> str:
+        """What agrees and what does not, in one sentence with the numbers."""
+        both, first, second = self.kinds
+        words = f"{len(both)} impacts are in both flights within {SHIFT * 1e3:g} ms of each other"
+        if len(both):
+            words += f" (median {np.median(np.abs(both.second - both.first)) * 1e3:.3g} ms)"
+        words += f", {len(first)} are in the first flight alone, {len(second)} in the second alone"
+        if len(lone := np.concatenate([first.first, second.second])):
+            words += f", the earliest of these at {lone.min() * 1e3:.1f} ms"
+        return f"{words}; impacts slower than {MIN_SPEED:g} m/s are not compared"
+
+
+def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
+    """Align the impacts of two runs of one throw, both of which keep a record of them; without one, raise Missing."""
+    until = float(min(first.t[-1], second.t[-1]))
+    (times, keys, unsure), (others, other_keys, other_unsure) = (_fast_impacts(run, until) for run in (first, second))
+    rows: list[tuple[int, int, float, float]] = []
+    for i in range(first.scenario.n_slices):
+        for end in END_NAMES:
+            mine, its = (np.flatnonzero((both == (i, end)).all(axis=1)) for both in (keys, other_keys))
+            j, k = closest(times, others, mine, its)
+            near = np.abs(others[k] - times[j]) <= SHIFT
+            j, k = j[near], k[near]
+            rows += [(i, end, *pair) for pair in zip(times[j], others[k], strict=True)]
+            rows += [(i, end, times[at], np.nan) for at in np.setdiff1d(mine, j) if not unsure[at]]
+            rows += [(i, end, np.nan, others[at]) for at in np.setdiff1d(its, k) if not other_unsure[at]]
+    rows.sort(key=lambda row: float(np.nanmin(row[2:])))
+    columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
+    return Alignment(
+        names=(first.label, second.label),
+        n_slices=first.scenario.n_slices,
+        until=until,
+        impacts=np.rec.fromarrays(columns, formats="i8,i8,f8,f8", names="slice,end,first,second"),
+        rests=(rest_intervals(first), rest_intervals(second)),
+    )
+
+
+def _fast_impacts(run: Trajectory, until: float) -> tuple[FloatArray, IndexArray, NDArray[np.bool_]]:
+    """Return time [s] and (slice, end) of the impacts up to the common end, and which prove nothing when alone."""
+    impacts = run.impacts
+    if impacts is None:
+        raise Missing(f"{run.label} keeps no record of impacts")
+    at = np.flatnonzero((impacts.time <= until) & (impacts.speed_before >= MIN_SPEED))
+    at = at[np.lexsort((impacts.slice[at], impacts.time[at]))]
+    unsure = (impacts.speed_before[at] < 2.0 * MIN_SPEED) | (impacts.time[at] > until - SHIFT)
+    return impacts.time[at], np.stack([impacts.slice[at], impacts.end[at]], axis=1), unsure
+
+
+def rest_intervals(run: Trajectory) -> Table:
+    """Return when each slice is in contact with an end: at or beyond it, or closer than a ten-thousandth of L.
+
+    A contact must hold at two output times in a row: at one alone, a slice may just be passing.
+    """
+    reach = 1e-4 * run.scenario.bottle.length
+    contacts = []
+    for end in END_NAMES:
+        gap = run.scenario.r_max - run.r if end == BASE else run.r - run.scenario.r_min
+        near = np.zeros((len(run.r) + 2, run.scenario.n_slices), dtype=np.int8)
+        near[1:-1] = gap <= reach
+        change = np.diff(near, axis=0).T
+        slices, start = np.nonzero(change == 1)
+        stop = np.nonzero(change == -1)[1] - 1
+        contacts.append(np.stack([slices, np.full(len(slices), end), start, stop])[:, stop > start])
+    slices, ends, start, stop = np.concatenate(contacts, axis=1)
+    columns = [slices, ends, run.t[start], run.t[stop]]
+    return np.rec.fromarrays(columns, formats="i8,i8,f8,f8", names="slice,end,start,stop")
+
+
+def study_tube(reference: Trajectory, run: Trajectory) -> tuple[Held, str]:
+    """Hold the omega of a run against the tube around that of the reference, and say in words what became of it."""
+    dt, dy = TUBE[0], TUBE[1] * abs(reference.scenario.omega0)
+    held = hold(reference.t, reference.omega, run.t, run.omega, dt=dt, dy=dy)
+    tube = f"the tube of ±{dt * 1e3:g} ms and ±{dy:.3g} around {reference.label} in omega"
+    if held.first_exit is None:
+        return held, f"{run.label} stays in {tube}"
+    words = f"{run.label} leaves {tube} at {held.first_exit * 1e3:.1f} ms, "
+    words += f"is inside for {held.share:.1%} of the time and at most {held.largest:.3g} outside"
+    return held, words + (f"; it ends at {run.t[-1] * 1e3:.1f} ms" if run.t[-1] < reference.t[-1] else "")
+
+
+Pairs = Mapping[tuple[str, str], tuple[Outcome[Alignment], Outcome[tuple[Held, str]]]]
 """Every pair aligned, and in its tube."""
 
 
 def study(ask: Ask) -> Study[Pairs]:
-    """Align the impacts of the pairs, and hold their omega in tubes of 2 ms and a hundredth of omega_0."""
+    """Align the impacts of the pairs, and hold their omega in tubes."""
     flights = yield [ask.solvers[name] for pair in PAIRS for name in pair]
-    dy = 0.01 * abs(ask.throw.omega0)
 
-    def both(pair: tuple[str, str]) -> Any:
-        return (flights[ask.solvers[name]].flight for name in pair)
+    def both(study: Any, pair: tuple[str, str]) -> Outcome[Any]:
+        return attempt(lambda: study(*(flights[ask.solvers[name]].flight for name in pair)))
 
-    return {
-        pair: (
-            attempt(lambda pair: study_alignment(*both(pair)), pair),
-            attempt(lambda pair: study_tube(*both(pair), dt=2e-3, dy=dy), pair),
-        )
-        for pair in PAIRS
-    }
+    return {pair: (both(study_alignment, pair), both(study_tube, pair)) for pair in PAIRS}
 
 
 def claims(results: Pairs) -> Claims:
     """Yield the share of the time that each second curve spends in the tube around the first: early is no failure."""
-    for (first, second), (_, tube) in results.items():
+    for (first, second), (aligned, tube) in results.items():
         if tube.found is None:
             yield Absent(f"tube-{first}-{second}", f"tube of {first} and {second}", tube.reason, "observation")
         else:
-            title = f"{second} in the tube around {first}: share of the time"
-            yield observed(f"tube-{first}-{second}", title, tube.found.share, "", tube.found.words)
-    for (first, second), (aligned, _) in results.items():
+            (held, words), title = tube.found, f"{second} in the tube around {first}: share of the time"
+            yield observed(f"tube-{first}-{second}", title, held.share, "", words)
         if aligned.found is None:
             title = f"alignment of {first} and {second}"
             yield Absent(f"alignment-{first}-{second}", title, aligned.reason, "observation")
@@ -67,35 +191,24 @@ def figures(results: Pairs) -> Iterator[Exhibit]:
             title=f"Contacts and impacts: {first} and {second}",
             caption="One row per slice. Bars are contacts, triangles are impacts; the upper lane of a row is the first "
             "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
-            "contacts and impacts of that slice. At a fork the slice strikes one end in the first flight and the "
-            "other end in the second.",
-            alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. "
-            f"{alignment.words}.".replace("ω₀", "omega_0"),
+            "contacts and impacts of that slice.",
+            alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. {alignment.words}.",
             maker=figure_gantt,
             data=(alignment,),
-            table=rows_csv(
-                ("run", "what", "slice [1]", "end", "impact number of its slice there [1]", "from [s]", "to [s]"),
-                _rows(alignment),
-            ),
+            table=rows_csv(("run", "what", "slice [1]", "end", "from [s]", "to [s]"), _rows(alignment)),
         )
 
 
 def _rows(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
-    """Yield every contact and impact of the two runs; of a matched impact the time in the first and in the second."""
-    first, second = both = alignment.first, alignment.second
-    for name, rests in zip(both, alignment.rests, strict=True):
+    """Yield every contact and impact of the two runs; of an impact of both the time in the first and in the second."""
+    for name, rests in zip(alignment.names, alignment.rests, strict=True):
         for i, end, start, stop in rests:
-            yield name, "contact", i, end_name(end), None, start, stop
-    kinds = np.where(alignment.shifted, "impact in both, shifted", "impact in both")
-    for hit, kind, shift in zip(alignment.matched, kinds, alignment.shift, strict=True):
-        yield f"{first}; {second}", str(kind), hit.slice, end_name(hit.end), hit.k, hit.time, hit.time + shift
-    for name, what, impacts in (
-        (first, f"impact missing in {second}", alignment.missing),
-        (second, f"impact missing in {first}", alignment.extra),
-        *((name, "impact after a fork", after) for name, after in zip(both, alignment.after_fork, strict=True)),
-    ):
-        for hit in impacts:
-            yield name, what, hit.slice, end_name(hit.end), hit.k, hit.time, hit.time
+            yield name, "contact", i, END_NAMES[end], start, stop
+    names = "; ".join(alignment.names), *alignment.names
+    for name, impacts in zip(names, alignment.kinds, strict=True):
+        what = "impact" if name in alignment.names else "impact in both"
+        for i, end, start, stop in impacts:
+            yield name, what, i, END_NAMES[end], *((start, stop) if start == start else (stop, start))
 
 
 def even_rows(n_slices: int) -> list[int]:
@@ -116,60 +229,37 @@ def figure_gantt(alignment: Alignment) -> Figure:
             if i in rows and start <= alignment.until:
                 bar: dict[str, Any] = {"height": 0.3, "color": END_COLOURS[end], "alpha": opacity, "linewidth": 0}
                 axes.barh(rows[i] + lane, min(stop, alignment.until) - start, left=start, **bar)
-    _draw_impacts(axes, alignment, rows)
-    for fork in alignment.forks:
-        if fork.first.slice in rows:
-            axes.plot(fork.time, rows[fork.first.slice], "*", color="black", markersize=9, zorder=5)
+    first, second = alignment.names
+    both, missing, extra = alignment.kinds
+    entry = partial(Line2D, [], [], linestyle="")
+    handles: list[Patch | Line2D] = []
+    for (end, name), mark in zip(END_NAMES.items(), MARKS, strict=True):
+        handles.append(Patch(color=END_COLOURS[end], label=f"in contact with the {name}"))
+        handles.append(entry(marker=mark, color="#444444", label=f"impact on the {name}"))
+    for impacts, colour, words in (
+        (both, "#444444", f"in both within {SHIFT * 1e3:g} ms"),
+        (missing, "#D1001C", f"in {first} alone"),
+        (extra, "#A030C0", f"in {second} alone"),
+    ):
+        _draw_impacts(axes, impacts, rows, colour)
+        handles.append(entry(marker="o", color=colour, label=f"{words} ({len(impacts)})"))
     axes.set_yticks(range(len(rows)), [str(i) for i in rows])
     axes.set_ylim(-0.6, len(rows) - 0.4)
     axes.set_xlim(-0.01 * alignment.until, 1.01 * alignment.until)
     axes.set(xlabel="time t [s]", ylabel="slice number [1], 0 starts on the base")
-    title = f"in each row: {alignment.first} above, {alignment.second} below; "
-    title += f"{len(alignment.swapped)} impacts in another order"
-    axes.set_title(title, fontsize=10, loc="left")
-    figure.legend(handles=_gantt_handles(alignment), loc="outside lower center", ncols=4)
+    axes.set_title(f"in each row: {first} above, {second} below", fontsize=10, loc="left")
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
 
-def _kinds(alignment: Alignment) -> list[tuple[str, str, float, Table, Table]]:
-    """Return every kind of impact in the order of drawing: its words, colour, size, those of either run or None."""
-    matched, moved, second = alignment.matched, alignment.shifted, alignment.second
-    later = matched.copy()
-    later.time += alignment.shift
-    return [
-        (f"agrees within {SHIFT_BAND * 1e3:g} ms ({(~moved).sum()})", "#444444", 3.5, matched[~moved], later[~moved]),
-        (f"shifted further ({moved.sum()})", SHIFTED, 5.0, matched[moved], later[moved]),
-        ("after a fork ({} + {})".format(*map(len, alignment.after_fork)), "#BBBBBB", 3.5, *alignment.after_fork),
-        (f"missing in {second} ({len(alignment.missing)})", "#D1001C", 6.5, alignment.missing, None),
-        (f"extra in {second} ({len(alignment.extra)})", "#A030C0", 6.5, None, alignment.extra),
-    ]
-
-
-def _draw_impacts(axes: Axes, alignment: Alignment, rows: dict[int, int]) -> None:
-    """Mark every impact in its lane, and join the two of a shifted pair."""
-    kinds = _kinds(alignment)
-    for here, there in zip(*kinds[1][3:], strict=True):
-        if here.slice in rows:
-            heights = [rows[here.slice] + lane for lane in LANES]
-            axes.plot((here.time, there.time), heights, color=SHIFTED, linewidth=0.6, alpha=0.7)
-    for k, (_, colour, size, *both) in enumerate(kinds):
-        look: dict[str, Any] = {"color": colour, "markersize": size, "zorder": 4 if k else 3}
-        for impacts, lane in zip(both, LANES, strict=True):
-            for end, marker in ((BASE, "v"), (CAP, "^")) if impacts is not None else ():
-                shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
-                heights = [rows[i] + lane for i in shown.slice]
-                axes.plot(shown.time, heights, marker, markeredgecolor="white", markeredgewidth=0.3, **look)
-
-
-def _gantt_handles(alignment: Alignment) -> list[Patch | Line2D]:
-    agrees, shifted, forked, missing, extra = _kinds(alignment)
-    marks = [("v", "#444444", "impact on the base"), ("^", "#444444", "impact on the cap")]
-    marks += [("o", colour, words) for words, colour, *_ in (agrees, shifted, missing, extra, forked)]
-    return [
-        *(Patch(color=colour, label=f"in contact with the {end_name(end)}") for end, colour in END_COLOURS.items()),
-        *(Line2D([], [], linestyle="", marker=mark, color=colour, label=words) for mark, colour, words in marks),
-        Line2D([], [], linestyle="", marker="*", markersize=9, color="black", label=f"fork ({len(alignment.forks)})"),
-    ]
+def _draw_impacts(axes: Axes, impacts: Table, rows: dict[int, int], colour: str) -> None:
+    """Mark impacts in the lane of each run that has them."""
+    for end, marker in zip(END_NAMES, MARKS, strict=True):
+        shown = impacts[(impacts.end == end) & np.isin(impacts.slice, list(rows))]
+        for times, lane in zip((shown.first, shown.second), LANES, strict=True):
+            heights = [rows[i] + lane for i in shown.slice]
+            look: dict[str, Any] = {"color": colour, "markeredgecolor": "white", "markeredgewidth": 0.3}
+            axes.plot(times, heights, marker, markersize=5.0, zorder=4, **look)
 
 
 CHAPTER: Final = Chapter("alignment", "Contacts and impacts side by side", study, claims, figures)

@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 
 from engine_check.engines import ENGINES
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
-from flipproof.chapters.predictability.chapter import parting_words
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, UNREFINED, WITNESSES, Guest
 from flipproof.figures.spoken import spoken
 from flipproof.figures.style import new_figure, styled
@@ -83,14 +82,13 @@ LEAST, MOST = 1e-6, 2.0
 
 
 class Differences(NamedTuple):
-    """Every pair both of whose flights were made, how each difference grows, and up to when free flight goes.
+    """Every pair both of whose flights were made, and up to when free flight goes.
 
     ``ended`` says where free flight stopped early, "" if it did not; ``missing`` why a pair could not be compared.
     ``guests`` are those of the pairs, by name, each with its own band.
     """
 
     pairs: tuple[Difference, ...]
-    growths: tuple[str, ...]
     ended: str
     missing: Mapping[tuple[str, str, str], str]
     guests: Mapping[str, tuple[Guest, float | None]] = MappingProxyType({})
@@ -129,18 +127,13 @@ def study(ask: Ask) -> Study[Differences]:
             finer=(refined[first], refined[second]) if {first, second} <= set(refined) else None,
         )
 
-    def growth(difference: Difference) -> str:
-        located = flown.get(LIMITS.get(difference.first, difference.first))
-        return parting_words(difference, None if located is None else located.impacts)
-
     tried = {pair: attempt(compared, *pair) for pair in pairs if set(pair[1:]) <= set(runs)}
     made = tuple(known(tried).values())
-    growths = tuple(growth(difference) for difference in made if difference.parting_time is not None)
     free, ended = flown.get(FREE), ""
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
     missing = {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason}
-    return Differences(made, growths, ended, missing, guests)
+    return Differences(made, ended, missing, guests)
 
 
 def guest_pairs(ask: Ask, flown: Mapping[str, Trajectory]) -> Iterator[tuple[str, str, str]]:

@@ -17,8 +17,8 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from flipproof.chapters.differences.study import claim_change, largest_change
 from flipproof.chapters.solvers import ENGINE
+from flipproof.curves.ensemble import claim_change, largest_change
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
 from flipproof.frame.findings import finite_or_none, regression

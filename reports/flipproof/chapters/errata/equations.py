@@ -12,7 +12,7 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from flipproof.chapters.differences.study import largest_change
+from flipproof.curves.ensemble import largest_change
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
 from slicemodel.observables import initial_moment_of_inertia

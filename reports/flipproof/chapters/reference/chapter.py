@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from flipproof.chapters.differences.study import claim_change
+from flipproof.curves.ensemble import claim_change
 from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged
 from flipproof.frame.twins import usual_rest_speed
 from ode_reference.bands import CUT

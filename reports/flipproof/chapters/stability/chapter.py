@@ -1,75 +1,224 @@
-"""Where pymunk is stable, and where it is right: the chart of step against iterations."""
+"""Where pymunk can be believed: step against solver iterations, for heavy and light water and few and many slices.
+
+Too few iterations and the joints open: the run explodes, and the engine's watch stops it. Too long a step and slices
+sink into the ends. Between the two lies a band in which nothing breaks and omega(t) is wrong all the same: only a
+reference shows it. Every cell of the chart is a run, or says why there is none; none is filled in from its neighbours.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
-from flipproof.chapters.stability.study import (
-    DEFAULT_ITERATIONS,
-    FULL,
-    GOOD,
-    QUICK,
-    RULE_DT,
-    Cell,
-    StabilityPanel,
-    plan_bands,
-    plan_stability,
-    study_stability,
-)
+from flipproof.chapters.maps.study import vary
+from flipproof.curves.ensemble import largest_change
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import (
-    Ask,
-    Band,
-    Chapter,
-    Claims,
-    Exhibit,
-    Finding,
-    Study,
-    attempt,
-    judged,
-    known,
-    observed,
-    regression,
-)
+from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Exhibit, Finding, Study, attempt, observed, regression
+from flipproof.frame.flights import Flights
 from flipproof.frame.solvers import Made, Run
+from flipproof.frame.twins import omega_band_call
 from flipproof.output.columns import rows_csv
-from slicemodel import Trajectory
+from slicemodel import Scenario, Trajectory
+from slicemodel.scenario import shortened
 
-Results = tuple[tuple[StabilityPanel, ...], Made]
-"""The charts, and the report's throw at the engine's own number of iterations."""
+DEFAULT_ITERATIONS: Final = 10
+"""What pymunk iterates unless asked for more."""
+
+GOOD: Final = 1e-2
+"""Largest |omega - omega of the reference| up to which a cell is called so, as a fraction of omega_0."""
+
+RULE_DT: Final = 2e-4
+"""The rule of ``enough_iterations`` is held against steps up to this one, twice the engine's default [s]."""
+
+LOOKS: Final = {
+    "good": ("#CDEBDC", "+", "+ error ≤ 1 % of ω₀"),
+    "wrong": ("#F7DC87", "≠", "≠ whole, but error > 1 %"),
+    "sinks in": ("#C6B5E3", "↓", "↓ stopped: slices sink in (shorten Δt)"),
+    "explodes": ("#EDA184", "×", "× stopped: joints open (iterate more)"),
+    "not run": ("#F0F0F0", "–", "– not run"),
+}
+"""Grade -> colour, sign and words, best first: the chart can be read without colours.
+
+"sinks in": slices lie too deep in an end; "explodes": another invariant broke.
+"""
 
 
-def study(ask: Ask) -> Study[Results]:
-    """Fly every cell of the layout ``ask.work``."""
-    default = Run("pymunk", ask.throw, {"iterations": DEFAULT_ITERATIONS}, f"pymunk, {DEFAULT_ITERATIONS} iterations")
-    calls = plan_bands(ask.reference, ask.work)
-    flights = yield [*plan_stability(ask.reference, ask.work), default, *calls.values()]
-    bands = known({run: attempt(flights.answer, call) for run, call in calls.items()})
-    largest = {run: float(band[-1]) for run, band in bands.items()}
-    return study_stability(ask.reference, ask.work, flights, largest), flights[default]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Which cells a chart has.
+
+    Parameters
+    ----------
+    panels : M_w / M_b [1] and slices of each
+    dt, iterations : steps, falling [s], and iterations, rising
+    duration : flight that is looked at [s]; a whole number of the longest step, which divides the output times
+    budget : slices times iterations times steps beyond which a cell is not run; 1e7 takes about a second
+    """
+
+    panels: tuple[tuple[float, int], ...]
+    dt: tuple[float, ...]
+    iterations: tuple[int, ...]
+    duration: float
+    budget: float
 
 
-def claims(results: Results) -> Claims:
+FULL: Final = Layout(
+    panels=((6.0, 10), (18.0, 10), (6.0, 50), (18.0, 50)),
+    dt=(2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5),
+    iterations=(5, 10, 20, 40, 70, 130, 200),
+    duration=0.25,
+    budget=3.3e7,
+)
+QUICK: Final = Layout(
+    panels=((6.0, 10), (18.0, 20)),
+    dt=(2e-3, 1e-3, 5e-4, 2e-4),
+    iterations=(5, 10, 40, 90),
+    duration=0.2,
+    budget=2e6,
+)
+
+
+class Cell(NamedTuple):
+    """What became of one flight; ``reason`` says why it stopped or was not made.
+
+    ``error`` is max |omega - omega of the reference| / |omega_0|, NaN where the run did not reach the end;
+    ``held_until`` is the last output time before the watch stopped the run [s], NaN where it did not.
+    """
+
+    grade: str = "not run"
+    error: float = math.nan
+    held_until: float = math.nan
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """The chart of one bottle: its runs, and once they are made its cells, by row of iterations and column of steps.
+
+    ``enough`` are the iterations that the rule asks for; ``band`` is that of omega(t) of the reference, fraction of
+    omega_0, NaN if it is not known.
+    """
+
+    layout: Layout
+    mass_ratio: float
+    slices: int
+    reference: Run
+    runs: Mapping[tuple[int, int], Run]
+    enough: int
+    band: float = math.nan
+    cells: Mapping[tuple[int, int], Cell]
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Number of cells of each grade."""
+        return Counter(cell.grade for cell in self.cells.values())
+
+    @property
+    def by_the_rule(self) -> list[float]:
+        """Errors of the cells that were run by the rule: enough iterations, dt up to RULE_DT; infinite if stopped."""
+        return [
+            math.inf if math.isfinite(cell.held_until) else cell.error
+            for (row, column), cell in self.cells.items()
+            if self.layout.iterations[row] >= self.enough
+            if self.layout.dt[column] <= RULE_DT * (1 + 1e-12) and cell.grade != "not run"
+        ]
+
+    @property
+    def at_default(self) -> list[str]:
+        """Grades at pymunk's own iterations, of the cells that were run."""
+        default = [cell for (row, _), cell in self.cells.items() if self.layout.iterations[row] == DEFAULT_ITERATIONS]
+        return [cell.grade for cell in default if cell.grade != "not run"]
+
+    @property
+    def words(self) -> str:
+        """The chart in words."""
+        counts = ", ".join(f"{self.counts[grade]} {grade}" for grade in LOOKS if self.counts[grade])
+        return f"M_w/M_b = {self.mass_ratio:g}, N = {self.slices}: {counts}; the rule asks for {self.enough} iterations"
+
+
+def plan_panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int) -> Panel:
+    """Return a panel with its runs: the throw with ``mass_ratio`` times the bottle's mass of water, cut anew.
+
+    Damping rate and release are the throw's. Outputs are one longest step apart, so that every cell has equal steps.
+    """
+    from engine_check.pymunk_settings import enough_iterations
+
+    fill = mass_ratio * throw.bottle.mass / throw.bottle.capacity
+    scenario = replace(vary(throw.with_slices(slices), fill=fill), duration=layout.duration)
+    times = np.linspace(0.0, layout.duration, round(layout.duration / layout.dt[0]) + 1)
+    label = f"stability, mass ratio {mass_ratio:g}, {slices} slices"
+    runs = {}
+    for row, iterations in enumerate(layout.iterations):
+        for column, dt in enumerate(layout.dt):
+            if slices * iterations * layout.duration / dt <= layout.budget:
+                settings = {"dt": dt, "iterations": iterations, "times": times}
+                runs[row, column] = Run("pymunk", scenario, settings, f"{label}, dt {dt:g} s, {iterations} iterations")
+    return Panel(
+        layout=layout,
+        mass_ratio=mass_ratio,
+        slices=slices,
+        reference=Run("free-flight", scenario, {"times": times}, f"{label}, free-flight"),
+        runs=runs,
+        enough=enough_iterations(scenario),
+        cells={},
+    )
+
+
+def read_panel(panel: Panel, flights: Flights, band: float) -> Panel:
+    """Return the panel with its cells."""
+    truth = attempt(lambda: flights[panel.reference].whole).found
+    dear = f"more than {panel.layout.budget:.1e} slices × iterations × steps"
+    places = [(row, column) for row in range(len(panel.layout.iterations)) for column in range(len(panel.layout.dt))]
+    cells = {at: cell_of(flights[panel.runs[at]], truth) if at in panel.runs else Cell(reason=dear) for at in places}
+    return replace(panel, cells=cells, band=band)
+
+
+def cell_of(made: Made, truth: Trajectory | None) -> Cell:
+    """Return what became of a run; one that is whole is held against the reference."""
+    flight = made.trajectory
+    if flight is None:
+        return Cell(reason=shortened(made.reason, 160))
+    if not flight.ok:
+        grade = "sinks in" if flight.reason == "penetration" else "explodes"
+        return Cell(grade, held_until=float(flight.t[-1]), reason=shortened(flight.message, 160))
+    if truth is None:
+        return Cell(reason="free-flight has no result to hold it against")
+    error = largest_change(truth, flight)
+    return Cell("good" if error <= GOOD else "wrong", error)  # NaN is wrong
+
+
+def study(ask: Ask) -> Study[tuple[Panel, ...]]:
+    """Fly every cell of the layout ``ask.work``, the slowest first."""
+    panels = [plan_panel(ask.reference, ask.work, *panel) for panel in ask.work.panels]
+    runs = [run for panel in panels for run in panel.runs.values()]
+    runs.sort(key=lambda run: -run.scenario.n_slices * run.settings["iterations"] / run.settings["dt"])
+    calls = [omega_band_call(panel.reference) for panel in panels]
+    flights = yield [*(panel.reference for panel in panels), *runs, *calls]
+    bands = [attempt(flights.answer, call).found for call in calls]
+    return tuple(
+        read_panel(panel, flights, math.nan if band is None else float(band[-1]))
+        for panel, band in zip(panels, bands, strict=True)
+    )
+
+
+def claims(panels: Sequence[Panel]) -> Claims:
     """Yield the rule of iterations, what happens at the default, and how many runs are whole and wrong."""
-    panels, default = results
-    id_, title = "engine-default-iterations", f"pymunk with its default {DEFAULT_ITERATIONS} iterations"
-    yield judged(claim_explosion_is_reported, default, id=id_, title=title, kind="observation")
     yield claim_rule_of_iterations(panels)
     yield claim_default_iterations_explode(panels)
     yield claim_whole_and_wrong(panels)
 
 
-def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
+def claim_rule_of_iterations(panels: Sequence[Panel]) -> Finding:
     """With the iterations that the rule asks for, and a step up to twice the default, pymunk follows free flight."""
     errors = [error for panel in panels for error in panel.by_the_rule]
     return regression(
@@ -84,7 +233,7 @@ def claim_rule_of_iterations(panels: Sequence[StabilityPanel]) -> Finding:
     )
 
 
-def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Finding:
+def claim_default_iterations_explode(panels: Sequence[Panel]) -> Finding:
     """No run with pymunk's own number of iterations reaches the end of the flight, whatever its step."""
     grades = [grade for panel in panels for grade in panel.at_default]
     whole = float(len(grades) - grades.count("explodes")) if grades else None
@@ -93,78 +242,47 @@ def claim_default_iterations_explode(panels: Sequence[StabilityPanel]) -> Findin
     return regression("engine-default-explodes", title, whole, "", (0.0, 0.0), note)
 
 
-def claim_whole_and_wrong(panels: Sequence[StabilityPanel]) -> Finding:
+def claim_whole_and_wrong(panels: Sequence[Panel]) -> Finding:
     """How many runs break no invariant and are wrong all the same: only a reference tells."""
-    counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in ("wrong", "good", "excellent")}
+    wrong, good = (sum(panel.counts[grade] for panel in panels) for grade in ("wrong", "good"))
     errors = [cell.error for panel in panels for cell in panel.cells.values() if cell.grade == "wrong"]
     note = f"by up to {100 * np.max(errors):.2g} % of ω₀; only a reference tells" if errors else "none on this chart"
     title = f"pymunk: runs that break no invariant and are wrong by more than {GOOD:.0%} of ω₀"
-    return observed("engine-whole-and-wrong", title, float(counts["wrong"]), f"of {sum(counts.values())}", note)
+    return observed("engine-whole-and-wrong", title, float(wrong), f"of {wrong + good}", note)
 
 
-def claim_explosion_is_reported(trajectory: Trajectory) -> Finding:
-    """At the engine's default of 10 iterations the run explodes, and is reported as diverged instead of shown."""
-    title = f"{trajectory.method} with its default 10 iterations: last output time before an invariant breaks"
-    until = float(trajectory.t[-1]) if trajectory.status == "diverged" else None
-    note = trajectory.message or "the run did not diverge"
-    return observed("engine-default-iterations", title, until, "s", note)
-
-
-def figures(results: Results) -> Iterator[Exhibit]:
+def figures(panels: Sequence[Panel]) -> Iterator[Exhibit]:
     """Yield the stability chart."""
-    panels, _ = results
-    counts = {grade: sum(panel.counts[grade] for panel in panels) for grade in panels[0].counts}
     default = [grade for panel in panels for grade in panel.at_default]
     missing = sorted({cell.reason for panel in panels for cell in panel.cells.values() if cell.grade == "not run"})
-    duration, burst = panels[0].layout.duration, default.count("explodes")
     caption = (
-        f"Every cell is a flight of {duration:g} s, held against event-driven free flight; the sign in it says the "
-        f"same as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} iterations (dashed) "
-        f"{burst} explode; their times from left to right show that a finer step does not help. Where a column reads "
-        "the same from some row upwards, more iterations no longer change anything, and only a shorter step does. "
-        f"{counts['wrong']} flights break no invariant and are wrong by more "
-        f"than 1 %; {counts['good'] + counts['excellent']} are good; {counts['explodes'] + counts['sinks in']} were "
-        "stopped, at the time that their cell shows."
+        f"Every cell is a flight of {panels[0].layout.duration:g} s, held against event-driven free flight; its sign "
+        f"says the same as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} "
+        f"iterations (dashed) {default.count('explodes')} explode; their times from left to right show that a finer "
+        "step does not help. Where a column reads the same from some row upwards, more iterations no longer change "
+        "anything, and only a shorter step does."
     )
-    if missing:
-        caption += f" Not run ({counts['not run']}): {'; '.join(missing)}."
     yield Exhibit(
         name="stability",
         title="Where pymunk is stable, and where it is right",
-        caption=caption,
+        caption=caption + (f" Not run: {'; '.join(missing)}." if missing else ""),
         alt="Charts of step against solver iterations. " + ". ".join(panel.words for panel in panels) + ".",
         maker=figure_stability,
         data=(panels,),
-        table=_cells_csv(panels),
-    )
-
-
-def _cells_csv(panels: Sequence[StabilityPanel]) -> str:
-    """Return every cell of the chart."""
-    return rows_csv(
-        ("mass ratio M_w/M_b [1]", "slices [1]", "iterations [1]", "iterations by the rule [1]", "dt [s]", "grade",
-         "largest error of omega [of omega_0]", "error of the plateau [of omega_0]", "stopped after [s]", "reason"),
-        (
-            (panel.mass_ratio, panel.slices, panel.layout.iterations[row], panel.enough, panel.layout.dt[column], *cell)
-            for panel in panels
-            for (row, column), cell in panel.cells.items()
+        table=rows_csv(
+            ("mass ratio M_w/M_b [1]", "slices [1]", "iterations [1]", "iterations by the rule [1]", "dt [s]", "grade",
+             "largest error of omega [of omega_0]", "stopped after [s]", "reason"),
+            (
+                (p.mass_ratio, p.slices, p.layout.iterations[row], p.enough, p.layout.dt[column], *cell)
+                for p in panels
+                for (row, column), cell in p.cells.items()
+            ),
         ),
     )  # fmt: skip
 
 
-LOOKS = {
-    "excellent": ("#7CCBA8", "++", "++ error ≤ 0.1 % of ω₀"),
-    "good": ("#CDEBDC", "+", "+ error ≤ 1 %"),
-    "wrong": ("#F7DC87", "≠", "≠ whole, but error > 1 %"),
-    "sinks in": ("#C6B5E3", "↓", "↓ stopped: slices sink in (shorten Δt)"),
-    "explodes": ("#EDA184", "×", "× stopped: joints open (iterate more)"),
-    "not run": ("#F0F0F0", "–", "– not run"),
-}
-"""One colour, one sign and the words of the legend per grade: the chart can be read without colours."""
-
-
 @styled
-def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
+def figure_stability(panels: Sequence[Panel]) -> Figure:
     """Grades over step and iterations, one panel per bottle: colour, sign and number in every cell."""
     columns = min(2, len(panels))
     rows = -(-len(panels) // columns)
@@ -178,19 +296,18 @@ def figure_stability(panels: Sequence[StabilityPanel]) -> Figure:
         at.set_ylabel("iterations per step [1]")
     for at in axes[-1, :]:
         at.set_xlabel("step Δt [ms], finer to the right")
-    handles: list[Artist] = [
-        Patch(facecolor=colour, edgecolor="#888888", label=words)
-        for grade, (colour, _, words) in LOOKS.items()
-        if any(panel.counts[grade] for panel in panels)
-    ]
+    graded = [look for grade, look in LOOKS.items() if any(panel.counts[grade] for panel in panels)]
     line = partial(Line2D, [], [], color="black")
-    handles.append(line(linewidth=2.0, label="rule: enough iterations above it"))
-    handles.append(line(linewidth=1.2, linestyle="--", label="pymunk's default iterations"))
+    handles = [
+        *(Patch(facecolor=colour, edgecolor="#888888", label=words) for colour, _, words in graded),
+        line(linewidth=2.0, label="rule: enough iterations above it"),
+        line(linewidth=1.2, linestyle="--", label="pymunk's default iterations"),
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
-def _draw_panel(axes: Axes, panel: StabilityPanel) -> None:
+def _draw_panel(axes: Axes, panel: Panel) -> None:
     steps, iterations = panel.layout.dt, panel.layout.iterations
     for (row, column), cell in panel.cells.items():
         corner = (column - 0.5, row - 0.5)
@@ -212,12 +329,12 @@ def _draw_panel(axes: Axes, panel: StabilityPanel) -> None:
 
 def _cell_text(cell: Cell, longest: float) -> str:
     sign, held = LOOKS[cell.grade][1], cell.held_until
+    if cell.grade in ("good", "wrong"):
+        return f"{sign}\n{100 * cell.error:.2g} %"
     if cell.grade == "not run":
         return sign
-    if cell.grade in ("explodes", "sinks in"):
-        # Not even the first output after release, one longest step later.
-        return f"{sign}\n{1e3 * held:.0f} ms" if held > 0.0 else f"{sign}\n< {1e3 * longest:g} ms"
-    return f"{sign}\n{100 * cell.error:.2g} %"
+    # Not even the first output after release, one longest step later.
+    return f"{sign}\n{1e3 * held:.0f} ms" if held > 0.0 else f"{sign}\n< {1e3 * longest:g} ms"
 
 
 CHAPTER: Final = Chapter(

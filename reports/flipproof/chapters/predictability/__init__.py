@@ -1,1 +1,0 @@
-"""How far a small change of the release moves a flight."""
