@@ -308,7 +308,7 @@ class Judged:
     """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
 
     ``own`` is the solver's own error of omega where it was judged, ``error`` says why there is no answer, ``since``
-    up to which impact it is right.
+    up to which impact it is right, and ``passed`` how many impacts that are.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
@@ -317,6 +317,7 @@ class Judged:
     share: float = 1.0
     error: str = ""
     since: str = ""
+    passed: int = 0
 
     @property
     def farthest(self) -> float:
@@ -373,25 +374,27 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         room_of_r = rooms.get("r", rooms["omega"])[clear]
         if late := _unmatched(ask, mine.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]):
             wrong["impacts"] = late
+    passed, since = _since(ask, truth.impacts or NO_IMPACTS, first) if wrong else (0, "")
     return Judged(
         wrong=wrong,
         own=float(np.max(owns["omega"][clear])) if clear.any() else float(owns["omega"].min()),
         largest=float(np.max(sizes(mine, truth, "omega")[clear], initial=0.0)),
         share=float(np.mean(clear)) * reached / len(ask.times),
-        since=_since(ask, truth.impacts or NO_IMPACTS, first) if wrong else "",
+        since=since,
+        passed=passed,
     )
 
 
-def _since(ask: Ask, impacts: Impacts, first: float) -> str:
-    """Return up to which impact an answer is right that is wrong at ``first`` [s], as a phrase."""
+def _since(ask: Ask, impacts: Impacts, first: float) -> tuple[int, str]:
+    """Return how many impacts an answer passes rightly that is wrong at ``first`` [s], and up to which, as a phrase."""
     right = np.max(ask.times[ask.times < first], initial=0.0)
     before = int(np.sum(impacts.time <= right))
     between = np.flatnonzero((impacts.time > right) & (impacts.time < first))
     if not between.size:
-        return f"{before} impacts before it was wrong" if before else "before the first impact"
+        return before, f"after {before} impacts that were right" if before else "before the first impact"
     k = int(between[0])
     which = f"slice {impacts.slice[k]} on the {'base' if impacts.end[k] > 0 else 'cap'} at {impacts.time[k]:.3g} s"
-    return f"after {f'{before} impacts that were right, ' if before else ''}the impact of {which}"
+    return before, f"after {f'{before} impacts that were right, ' if before else ''}the impact of {which}"
 
 
 NO_IMPACTS: Final = Impacts(np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
@@ -547,7 +550,7 @@ def bisected(
         name = max(alone, key=lambda each: alone[each].excess)
         return (
             f"{ice}right at {said(PAPER, name)}, wrong at {said(knobs, name)}: {_wrong_words(alone[name])}",
-            f"{WORDS[name][1]}{_field_advice(alone[name], '; ')}",
+            f"{_impact_advice(alone[name])}{WORDS[name][1]}{_field_advice(alone[name], '; ')}",
         )
     turned = yield from how([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
     for name, back in zip(names, turned, strict=True):
@@ -555,7 +558,7 @@ def bisected(
             return (
                 f"{ice}right at {said(PAPER, name)}, wrong at {said(knobs, name)} where other things are changed, too: "
                 f"{lost}",
-                f"{WORDS[name][1]}{_field_advice(judged, '; ')}",
+                f"{_impact_advice(judged)}{WORDS[name][1]}{_field_advice(judged, '; ')}",
             )
     return f"{ice}{lost} where {', '.join(said(knobs, name) for name in names)}", _field_advice(judged)
 
@@ -608,6 +611,15 @@ def _wrong_words(judged: Judged) -> str:
     is_off = f"{'are' if worst[0] == 'impacts' else 'is'} {off:.2g} of {unit} off (room {room:.1g})"
     since = f", first {judged.since}" if judged.since else ""
     return f"{worst[0]} {is_off} at t = {time:.3g} s{also}{since}"
+
+
+def _impact_advice(judged: Judged) -> str:
+    """Return that impacts come first, where an answer is right through some of them and wrong later."""
+    return (
+        "right through some impacts: look at impacts first, their order and number, and rests; "
+        if judged.passed
+        else ""
+    )
 
 
 def _field_advice(judged: Judged, before: str = "") -> str:
