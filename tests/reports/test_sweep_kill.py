@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -84,9 +85,10 @@ def test_a_long_sweep_outlives_its_worker_and_goes_on_after_an_interrupt(tmp_pat
         count = sweep_kill.wait_for_rows(process, out, count)
     (line,) = interrupt(process)
     kept = sweep_kill.rows(out)
-    assert line == (
-        f"flipproof: interrupted; {len(kept)} of 100000 points are stored; the same command goes on from there"
-    )
+    words = "flipproof: interrupted; at least (.*) of 100000 points are stored; the same command goes on from there"
+    said = int(re.fullmatch(words, line)[1])
+    # A chunk may be stored when the interrupt comes, and not be counted yet.
+    assert len(kept) - 64 <= said <= len(kept)
     assert count <= len(kept) < 100_000
 
 
