@@ -33,6 +33,7 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
     "second": patches("second"),
     "third": patches("third"),
     "fourth": patches("fourth"),
+    "fifth": patches("fifth"),
     "right": dict(RIGHT),
 }
 """Mistakes by list and name, and solvers without one."""
@@ -58,6 +59,8 @@ class Limited(InProcess):
             signal.setitimer(signal.ITIMER_PROF, 60.0)
         try:
             return super().__call__(ask)
+        except (RuntimeError, ArithmeticError) as error:  # a solver that gives up, as in a process of its own
+            raise ForeignError(f"{type(error).__name__}: {error}") from None
         finally:
             if hasattr(signal, "setitimer"):
                 signal.setitimer(signal.ITIMER_PROF, 0.0)
