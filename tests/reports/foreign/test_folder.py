@@ -52,10 +52,7 @@ def test_answers_by_files_get_a_verdict(tmp_path):
     found = certify(first)
     assert first.waiting
     assert {r.verdict for r in found.results} == {WAITING, IDLE}
-    assert (
-        found.conclusion
-        == f"23 checks: 0 passed, 0 failed, 22 waiting, 1 not applicable ({found.results[-2].check}: {found.results[-2].reason})"
-    )
+    assert "22 waiting, 1 not applicable (published-vectors: " in found.conclusion
     for _ in range(8):  # further questions depend on the answers
         answer_all(folder, opened("midpoint"))
         runner = Folder(folder)
