@@ -59,7 +59,9 @@ class Limited(InProcess):
             signal.setitimer(signal.ITIMER_PROF, 60.0)
         try:
             return super().__call__(ask)
-        except (RuntimeError, ArithmeticError) as error:  # a solver that gives up, as in a process of its own
+        except ForeignError:
+            raise
+        except (RuntimeError, ArithmeticError, ValueError) as error:  # a solver that gives up, as in its own process
             raise ForeignError(f"{type(error).__name__}: {error}") from None
         finally:
             if hasattr(signal, "setitimer"):
