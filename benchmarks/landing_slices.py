@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import ode_reference
 from flipproof.chapters.landing.study import Size, cell_of, filled
-from flipproof.landing.design import Case, Throws, aimed, make_cases
+from flipproof.chapters.landing.throws import Case, Throws, aimed, make_cases
 from slicemodel import Scenario, Table
 
 

@@ -31,7 +31,7 @@ import numpy as np
 import engine_check
 import ode_reference
 from engine_check.landing import LANDERS
-from ode_reference.landing import path
+from ode_reference.landing.land import path
 from slicemodel import Scenario, Table, Touch
 
 REFERENCE = "event-driven"

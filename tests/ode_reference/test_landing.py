@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 import engine_check
 import ode_reference
-from ode_reference.landing import path, world_of
+from ode_reference.landing.land import path, world_of
 from slicemodel import Bottle, Outcome, Scenario, ScenarioError, Table, Touch, touch
 from slicemodel.observables import static_toppling_angle
 

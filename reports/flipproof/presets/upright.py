@@ -17,8 +17,8 @@ from typing import Any, Final
 
 from flipproof.chapters.landing.figures import figures, map_csv, share_line, shares_csv
 from flipproof.chapters.landing.study import Cases, Rows, Size, aiming, counting, read
-from flipproof.landing.design import Throws
-from flipproof.landing.work import Landed
+from flipproof.chapters.landing.throws import Throws
+from flipproof.chapters.landing.work import Landed
 from flipproof.output.files import write_whole
 from flipproof.output.folder import MARKER, OutputError, check_own, marker_text
 from flipproof.sweep.command import Begin, completed

@@ -1,8 +1,8 @@
 """A point of a sweep: what is asked, the key of its row, and how a worker makes some of them together.
 
 A point names its maker, a function "module:name" that returns rows. Flights are made here; a landing's maker is
-``flipproof.landing.work``. Nothing here knows which machine it runs on: a row depends on nothing but its own point, so
-that chunks, workers and resuming cannot change a bit of it.
+``flipproof.chapters.landing.work``. Nothing here knows which machine it runs on: a row depends on nothing but its own
+point, so that chunks, workers and resuming cannot change a bit of it.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ SOURCES: Final = (
     "engine_check",
     "flipproof.frame.solvers",
     "flipproof.sweep.work",
-    "flipproof.landing.work",
+    "flipproof.chapters.landing.work",
 )
 """What a row's numbers depend on."""
 

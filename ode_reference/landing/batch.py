@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
-from ode_reference.landing import DEFAULT_DT, land
+from ode_reference.landing.land import DEFAULT_DT, land
 from slicemodel.scenario import not_whole
 from slicemodel.table import Outcome, Table, Touch
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ode_reference.landing_core.contacts import first_zero, gaps, rates, seat
-from ode_reference.landing_core.layout import (
+from ode_reference.landing.contacts import first_zero, gaps, rates, seat
+from ode_reference.landing.layout import (
     ALOFT,
     BROKEN,
     CAP,
@@ -21,7 +21,7 @@ from ode_reference.landing_core.layout import (
     UPRIGHT,
     Landing,
 )
-from ode_reference.landing_core.motion import energy, impact, step
+from ode_reference.landing.motion import energy, impact, step
 from slicemodel.compiled import kept_on_disk
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ode_reference.landing_core.layout import MAX_POOLS
+from ode_reference.landing.layout import MAX_POOLS
 from slicemodel.compiled import merged
 
 

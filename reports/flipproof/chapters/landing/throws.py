@@ -20,7 +20,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.landing.work import MAKER, REFERENCE, Landed, make_landing
+from flipproof.chapters.landing.work import MAKER, REFERENCE, Landed, make_landing
 from flipproof.sweep.work import Point
 from ode_reference import turn
 from slicemodel import Scenario

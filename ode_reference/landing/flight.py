@@ -1,4 +1,4 @@
-"""The flight that ends in a touch: the throw from its release to the table, by the equations of ``landing_core``."""
+"""The flight that ends in a touch: the throw from its release to the table, by the landing's own equations."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from ode_reference.arguments import number_above, number_within
-from ode_reference.landing import state_of, world_of
-from ode_reference.landing_core.layout import TOUCHED, World
+from ode_reference.landing.land import state_of, world_of
+from ode_reference.landing.layout import TOUCHED, World
 from slicemodel.scenario import Scenario
 from slicemodel.table import Table, Touch
 from slicemodel.trajectory import FloatArray
@@ -157,7 +157,7 @@ def _loop(
     every: float = 1.0,
     record: FloatArray | None = None,
 ) -> Any:
-    from ode_reference.landing_core.loop import land
+    from ode_reference.landing.loop import land
 
     record = np.empty((0, 7 + 2 * world.n)) if record is None else record
     return land(q, s, w, dt, duration, True, world, every, record)

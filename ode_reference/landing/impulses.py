@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ode_reference.landing_core.layout import CREEPING, MAX_POOLS, MAX_SWEEPS
-from ode_reference.landing_core.pools import pool_chain, pool_stops
+from ode_reference.landing.layout import CREEPING, MAX_POOLS, MAX_SWEEPS
+from ode_reference.landing.pools import pool_chain, pool_stops
 from slicemodel.compiled import merged
 
 

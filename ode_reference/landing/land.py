@@ -1,7 +1,7 @@
 """The landing verb of this room: one touch and one table in, one certified outcome out.
 
-The motion is that of ``landing_core``: events located, impulses by Newton's law. Where the outcome is certified is
-decided by energy (``slicemodel.table.Outcome``), and whether by a second run with half the step.
+The motion is that of ``ode_reference.landing``: events located, impulses by Newton's law. Where the outcome is
+certified is decided by energy (``slicemodel.table.Outcome``), and whether by a second run with half the step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table,
 from slicemodel.trajectory import FloatArray
 
 if TYPE_CHECKING:
-    from ode_reference.landing_core.layout import Landing, World
+    from ode_reference.landing.layout import Landing, World
 
 DEFAULT_DT: Final = 4e-4
 """Longest step [s]; the numbers of an outcome are those of half of it."""
@@ -86,7 +86,7 @@ def land(
     *,
     dt: float = DEFAULT_DT,
 ) -> Outcome:
-    """Land a bottle on a table, impact by impact, until its outcome is certain (derived in ``landing_core``).
+    """Land a bottle on a table, impact by impact, until its outcome is certain (derived in ``ode_reference.landing``).
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _law(scenario: Scenario, law: str | None) -> str:
 
 def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
     """Return the constants of a landing, or raise ValueError for slices that are not where they may be."""
-    from ode_reference.landing_core.layout import World
+    from ode_reference.landing.layout import World
 
     if known_name("slices", slices, SLICES) == "overlap":
         raise ValueError(
@@ -219,7 +219,7 @@ def _refuse_misplaced(touch: Touch, chain: bool, low: FloatArray, high: FloatArr
 
 
 def state_of(touch: Touch, world: World) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (q, s, w) of ``landing_core``: the lowest corner on the table, the tube's middle over x = 0."""
+    """Return (q, s, w) of ``ode_reference.landing``: the lowest corner on the table, the tube's middle over x = 0."""
     sine, cosine = math.sin(touch.theta), math.cos(touch.theta)
     height = world.half * abs(cosine) + world.radius * abs(sine)
     q = np.array([0.0, height, touch.theta, *touch.velocity, touch.omega])
@@ -227,7 +227,7 @@ def state_of(touch: Touch, world: World) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def _run(touch: Touch, world: World, dt: float) -> Landing:
-    from ode_reference.landing_core import loop
+    from ode_reference.landing import loop
 
     q, s, w = state_of(touch, world)
     none = np.empty((0, 7 + 2 * world.n))
@@ -251,7 +251,7 @@ def path(
     ``every`` is the time between two instants, at most ``dt`` late, ``duration`` the whole [s]; the touch may be lifted
     by ``drop`` [m] first.
     """
-    from ode_reference.landing_core import loop, motion
+    from ode_reference.landing import loop, motion
 
     # Without a saddle nothing ends the run before its time.
     world = world_of(touch, table, _law(touch.scenario, law), slices)
@@ -277,7 +277,7 @@ def path(
 
 def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, object]) -> Outcome:
     """Return the outcome of a run and of its twins, which start from touches that differ by ``shift``."""
-    from ode_reference.landing_core.layout import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
+    from ode_reference.landing.layout import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
 
     names = {UPRIGHT: "upright", LYING: "lying", CAP: "cap"}
     run, *twins = runs
