@@ -68,8 +68,12 @@ def check_determinism(traits: Traits) -> Making:
     ask, other = ask_of(traits, THROW), ask_of(traits, OTHER)
     # Ice of as many slices as were thrown before, and of another number: what is kept from the throw before shows.
     ice = [ask_of(traits, replace(THROW.with_slices(n), frozen=True)) for n in (THROW.n_slices, 8)]
-    first, _, second, *frozen = yield [ask, other, ask, *ice]
-    change = max(float(np.max(np.abs(getattr(first, f) - getattr(second, f)))) for f in ("theta", "omega"))
+    first, _, second, *frozen, last = yield [ask, other, ask, *ice, ask]
+    change = max(
+        float(np.max(np.abs(getattr(first, name) - getattr(again, name))))
+        for name in ("theta", "omega")
+        for again in (second, last)
+    )
     flows, stays = (float(np.ptp(answer.omega)) / abs(THROW.omega0) for answer in frozen)
     kept = flows > 0.01 > 100 * stays
     came = "the same numbers" if change == 0.0 else f"numbers that differ by {change:.2g}"
@@ -77,7 +81,7 @@ def check_determinism(traits: Traits) -> Making:
         holds=change == 0.0 and not kept,
         expected="the same numbers",
         came=f"ice of {THROW.n_slices} slices flows after such a throw, that of 8 does not" if kept else came,
-        where="one throw asked twice, others between",
+        where="one throw asked three times, others and ice between",
         advice="reset all state between asks, keep nothing under a part of the throw, and seed random numbers",
     )
 

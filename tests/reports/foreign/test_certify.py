@@ -570,6 +570,7 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating"),
         ("fixed_omega_from_differences", "start", "not a slope of theta"),
         ("halving_drag_of_momentum", "angular-momentum", "right without drag: look at the drag"),
+        ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
         ("halving_released_level", "mirror", "right without weight: look at the weight"),
     ],
 )
