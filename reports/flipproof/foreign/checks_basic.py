@@ -52,6 +52,7 @@ def check_start(traits: Traits) -> Making:
     late = (answer.theta[0] - throw.theta0) / throw.omega0
     drifted = worst == "theta" and bound < late < 0.02  # a step or two; answers may belong to other times
     sloped = worst == "omega" and bound < off[worst] < 0.05
+    shared = worst == "r" and answer.r is not None and float(np.max(np.ptp(answer.r, axis=0))) == 0.0
     return Found(
         holds=off[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
@@ -59,6 +60,7 @@ def check_start(traits: Traits) -> Making:
         where=f"t = 0 s, theta_0 = {throw.theta0:.3g} rad, omega_0 = {throw.omega0:g} rad/s",
         advice=("answer at ask.times themselves; " if drifted else "")
         + ("omega is that of the instant, not a slope of theta between two times; " if sloped else "")
+        + ("r is the same at all times: keep a copy of the slices' places for each; " if shared else "")
         + "begin at scenario.theta0, scenario.omega0 and ask.start, with all slices at rest",
     )
 
@@ -182,12 +184,17 @@ def check_ice(traits: Traits) -> Making:
         bounds["theta"] = 1000 * traits.epsilon / 2
     expected = {"omega": "omega constant", "theta": "theta = theta_0 + omega_0 t", "r": "r constant"}
     worst = next((name for name in off if not off[name].max() <= bounds[name]), "omega")
+    turns = (answer.theta - THROW.theta0 - turned) / (2 * np.pi)
+    whole = np.rint(turns)
+    wrapped = worst == "theta" and bool(np.ptp(whole)) and float(np.max(np.abs(turns - whole))) <= bounds["theta"]
     return Found(
         holds=float(off[worst].max()) <= bounds[worst],
         expected=f"{expected[worst]} within {bounds[worst]:.1g}",
         came=f"{worst} off by {off[worst].max():.2g}",
         where=f"scenario.frozen = True, {when(ask.times, off[worst])}",
-        advice="hold every slice where it is when scenario.frozen is true, and let theta go on from theta_0",
+        advice="theta is off by whole turns: do not wrap it"
+        if wrapped
+        else "hold every slice where it is when scenario.frozen is true, and let theta go on from theta_0",
         facts={"drift": float(off["omega"].max())},
     )
 

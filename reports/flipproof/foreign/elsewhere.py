@@ -621,7 +621,11 @@ def _wrong_words(judged: Judged) -> str:
 def _impact_advice(judged: Judged) -> str:
     """Return that impacts come first, where omega is right through some of them and wrong later."""
     late = judged.passed and "omega" in judged.wrong
-    return "right through some impacts: look at impacts first, their order and number, and rests; " if late else ""
+    return (
+        "right through some impacts: look first at impacts, their order and number, and at rests and their ends; "
+        if late
+        else ""
+    )
 
 
 def _field_advice(judged: Judged, before: str = "") -> str:
