@@ -238,6 +238,15 @@ def test_an_answer_that_is_no_flight_is_named(answer, words):
         Adapter("bad", lambda *_: answer).drop(1.0, 0.0, 0.5, 9.81, 1e-3, 0.2)
 
 
+def test_what_an_adapter_raises_is_its_own_failure_with_the_question_and_the_place():
+    def drop(height, *_):
+        raise RuntimeError(f"no convergence at {height}")
+
+    words = r"^\(height=1, .*, duration=0.2\) raised RuntimeError: no convergence at 1.0 \(test_bounce.py, line \d+\)$"
+    with pytest.raises(AdapterError, match=words):
+        Adapter("bad", drop).drop(1.0, 0.0, 0.5, 9.81, 1e-3, 0.2)
+
+
 @pytest.mark.parametrize("spec", ["nothing", "nowhere.py:drop", "cmd:true {effort}", "cmd:false", "cmd:echo x"])
 def test_a_bad_adapter_is_named_in_one_line(spec):
     with pytest.raises(AdapterError) as error:
