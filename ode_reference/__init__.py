@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from ode_reference.bands import estimate_band
     from ode_reference.combinations import model_of
     from ode_reference.impacts import LAWS
-    from ode_reference.landing.batch import land_batch
     from ode_reference.landing.flight import fly, turn
     from ode_reference.landing.land import land
     from ode_reference.models import LADDER, MODELS
@@ -30,7 +29,6 @@ __all__ = [
     "estimate_band",
     "fly",
     "land",
-    "land_batch",
     "model_of",
     "solve",
     "solve_batch",
@@ -47,7 +45,6 @@ _HOMES = {
     "estimate_band": "ode_reference.bands",
     "fly": "ode_reference.landing.flight",
     "land": "ode_reference.landing.land",
-    "land_batch": "ode_reference.landing.batch",
     "model_of": "ode_reference.combinations",
     "solve": "ode_reference.solver",
     "solve_batch": "ode_reference.solver",

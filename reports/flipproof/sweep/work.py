@@ -18,7 +18,7 @@ import numpy as np
 
 from flipproof.foreign.specs import content_of
 from flipproof.frame.keys import changed_since_import, fingerprint, versions_of
-from flipproof.frame.solvers import Run, find, solve
+from flipproof.frame.solvers import find, solve
 from flipproof.frame.store import json_of
 from flipproof.output.provenance import provenance, version_of
 from flipproof.sweep.errors import SweepError
@@ -103,11 +103,6 @@ class Made(NamedTuple):
     versions: Mapping[str, str]
     rows: Sequence[Row]
     changed: str = ""
-
-
-def point_of(run: Run, **options: Any) -> Point:
-    """Return the point that makes a run of a study; ``options`` are those of ``make_flights``."""
-    return Point(run.solver, run.scenario.to_mapping(), run.settings, options=options)
 
 
 def kind_of(point: Point) -> str:
