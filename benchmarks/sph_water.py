@@ -1,11 +1,12 @@
 """Water as particles (SPH), a second fluid that parts where it is pulled: plateaus, swirl, and what is lost.
 
     python benchmarks/sph_water.py                                # a quarter, a half, three quarters full; 4 mm
-    python benchmarks/sph_water.py --spacing 0.008 0.004 0.002    # 2 mm: about two minutes a flight
+    python benchmarks/sph_water.py --spacing 0.008 0.004 0.002    # 2 mm: one or two minutes a flight
     python benchmarks/sph_water.py --fillings 1 --start irrotational
 
 It shares no line and no method with ``ode_reference.ideal_water``, which it is held against: particles instead of a
-grid, a little compressible instead of incompressible, explicit forces instead of a pressure solve, and no mended density.
+grid, a little compressible instead of incompressible, explicit forces instead of a pressure solve. The columns beside
+its own are rods as points, rods with the inertia of discs, both without drag, and ideal water with --cells across.
 
 A slab of unit thickness flies in the frame of C_M, which falls, so that nothing but water and bottle act on each other:
 
@@ -50,13 +51,16 @@ VISCOSITY: Final = 0.02
 """Factor of Monaghan's viscosity [1]."""
 
 COURANT: Final = 0.2
-"""Way of sound in a step [s]."""
+"""Way of sound and of the fastest water in a step [s]."""
 
 STARTS: Final = ("spinning", "irrotational")
 
 
 class Flight(NamedTuple):
-    """omega / omega_0 and J over time, shape (T,), and what is left at the end."""
+    """omega / omega_0, J, the share of angular momentum in swirl and energy over the first, shape (T,); what is lost.
+
+    ``drift`` is the largest |L / L_0 - 1|, ``momentum`` the largest over M omega_0 L.
+    """
 
     t: Floats
     share: Floats
@@ -166,9 +170,9 @@ def fly(scenario: Scenario, spacing: float, start: str) -> Flight:
     bottle, omega = scenario.bottle, scenario.omega0
     width, depth = 2 * bottle.radius, scenario.fill_fraction * bottle.length
     along, across = round(depth / spacing), round(width / spacing)
-    place = np.meshgrid(bottle.length / 2 - (np.arange(along) + 0.5) * depth / along,
-                        ((np.arange(across) + 0.5) / across - 0.5) * width, indexing="ij")  # fmt: skip
-    x = np.column_stack([each.ravel() for each in place])
+    rows = bottle.length / 2 - (np.arange(along) + 0.5) * depth / along
+    files = ((np.arange(across) + 0.5) / across - 0.5) * width
+    x = np.column_stack([np.repeat(rows, across), np.tile(files, along)])
     n, m, rho_0 = len(x), scenario.water_mass / len(x), bottle.capacity / (bottle.length * width)
     s = SMOOTHING * math.sqrt(m / rho_0)
     total, own = scenario.total_mass, bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
@@ -176,7 +180,8 @@ def fly(scenario: Scenario, spacing: float, start: str) -> Flight:
     v = omega * np.column_stack([origin[1] - x[:, 1], x[:, 0] - origin[0]])
     if start == "irrotational":
         middle = (bottle.length - depth) / 2
-        v = irrotational(x[:, 0] - middle, x[:, 1], depth, width, omega) + [0.0, omega * (middle - origin[0])]
+        v = irrotational(x[:, 0] - middle, x[:, 1], depth, width, omega)
+        v[:, 1] += omega * (middle - origin[0])
     body = np.array([*-origin, 0.0, omega * origin[1], -omega * origin[0], omega])
     x -= origin
     surplus = (m * v.sum(axis=0) + bottle.mass * body[3:5]) / total
@@ -208,7 +213,7 @@ def fly(scenario: Scenario, spacing: float, start: str) -> Flight:
     steps = math.ceil(scenario.duration * (SOUND + abs(omega) * bottle.length) / (COURANT * s))
     dt = scenario.duration / steps
     gained, elastic = act()
-    rows = [(0.0, *totals(elastic))]
+    history = [(0.0, *totals(elastic))]
     for k in range(steps):
         v += push * (dt / 2)
         body[3:] += gained * (dt / 2)
@@ -218,18 +223,19 @@ def fly(scenario: Scenario, spacing: float, start: str) -> Flight:
         v += push * (dt / 2)
         body[3:] += gained * (dt / 2)
         if k % 50 == 49 or k == steps - 1:
-            rows.append(((k + 1) * dt, *totals(elastic)))
-    t, share, inertia, spin, momentum, energy = np.array(rows).T
-    scale = total * abs(omega) * bottle.length
-    swirl = 1 - share * omega * inertia / spin
-    return Flight(t, share, inertia, swirl, float(np.abs(spin / spin[0] - 1).max()), float(momentum.max() / scale),
-                  energy / energy[0], n)  # fmt: skip
+            history.append(((k + 1) * dt, *totals(elastic)))
+    t, share, inertia, spin, momentum, energy = np.array(history).T
+    lost = float(momentum.max() / (total * abs(omega) * bottle.length))
+    swirl, drift = 1 - share * omega * inertia / spin, float(np.abs(spin / spin[0] - 1).max())
+    return Flight(t, share, inertia, swirl, drift, lost, energy / energy[0], n)
 
 
 def lines(asked: argparse.Namespace) -> Iterator[str]:
     """Yield a line for each flight, beside rods and ideal water of the same throw."""
-    yield ("filling spacing particles  plateau  swirl  J/J_0  min(omega)  dL       dP       E_max   E_end    "
-           "rods   discs  ideal water (swirl)  cpu s")  # fmt: skip
+    yield (
+        "filling spacing particles  plateau  swirl  J/J_0  min(omega)  dL       dP       E_max   E_end    "
+        "rods   discs  ideal water (swirl)  cpu s"
+    )
     for filling in asked.fillings:
         scenario = replace(Scenario(), water_mass=filling * Scenario().bottle.capacity, drag=0.0)
         levels = [
