@@ -319,14 +319,17 @@ class _Fluid:
         return mass.reshape(shape), np.divide(sums, mass, out=np.zeros_like(sums), where=mass > 0).reshape(shape)
 
     def from_grid(self, k: int, at: _Stencil, mass: FloatArray, face: FloatArray) -> None:
-        """Read velocity and its gradient; in the half cell at a wall the gradient is continued."""
+        """Read velocity and its gradient; in the half cell at a wall nothing but the bottle's turning is continued.
+
+        The gradient read there would make water at a wall overshoot what the grid says, and slip would grow by itself.
+        """
         value, full = face.ravel()[at.points], mass.ravel()[at.points] > 0
         steps_x = [(value[b] - value[a]) * (full[a] & full[b]) / self.hx for a, b in ((0, 2), (1, 3))]
         steps_y = [(value[b] - value[a]) * (full[a] & full[b]) / self.hy for a, b in ((0, 1), (2, 3))]
         gx, gy = (1 - at.fy) * steps_x[0] + at.fy * steps_x[1], (1 - at.fx) * steps_y[0] + at.fx * steps_y[1]
         mean, (dx, dy) = (at.weight * value).sum(0), at.away
         self.c[k] = gx, gy
-        self.b[k] = gx * dx + gy * dy
+        self.b[k] = self.q[2] * (dx if k else -dy)
         (self.u, self.v)[k][:] = mean - self.b[k]
         self.hold(k, at)
         heavy = (np.where(at.weight > 0, mass.ravel()[at.points], np.inf) > LIGHT * self.cell_mass).all(axis=0)

@@ -147,7 +147,7 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
         assert float(row["fill_fraction"]) == study.fills[at[1]]
         assert float(row["gamma/omega0"]) == study.values[at[0]]
         assert float(row["plateau eq8"]) == study.level["eq8"][at]
-        assert float(row["plateau column"]) == study.level["column"][at]
+        assert float(row["plateau rods"]) == study.level["rods"][at]
         assert float(row["fair share of gravity in Eq. 8"]) == study.shares[RUNGS.index("gravity in Eq. 8")][at]
         assert row["largest fair share"] == RUNGS[study.dominant[at]]
         assert row["reason"] == ""

@@ -131,10 +131,10 @@ def test_the_csv_of_a_figure_is_what_is_drawn(gathered, report):
         column = [float(row[f"difference in omega/omega_0: {difference.name} [1]"]) for row in tables["differences"]]
         assert max(map(abs, column)) == pytest.approx(difference.largest, rel=1e-8, abs=0.0)
     waterfall = gathered.found("waterfall")[0]
-    *bars, total, column = [float(row["mean of all orders [1]"]) for row in tables["waterfall"]]
+    *bars, total, rods = [float(row["mean of all orders [1]"]) for row in tables["waterfall"]]
     assert sum(bars) == pytest.approx(total, abs=1e-7)
     assert total == pytest.approx(waterfall.end, rel=1e-8, abs=0.0)
-    assert column == pytest.approx(waterfall.column, rel=1e-8, abs=0.0)
+    assert rods == pytest.approx(waterfall.rods, rel=1e-8, abs=0.0)
 
 
 def test_workers_draw_the_same_bytes_in_the_same_order(gathered, report):

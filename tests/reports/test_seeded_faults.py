@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slicemodel
-from flipproof.chapters.waterfall.study import STEP, column_run, observe, plan_waterfall, split_all
+from flipproof.chapters.waterfall.study import STEP, observe, plan_waterfall, rods_run, split_all
 from flipproof.frame.equations import NAMES
 from flipproof.frame.solvers import make
 from flipproof.frame.twins import twins
@@ -130,7 +130,7 @@ each_fault = pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.pl
 def bars():
     """Return the plateau's bars in the order of the ladder, every run made here by the method that faults spoil."""
     runs = {}
-    # The last run is the column's, which stands in the margin and has no fault here.
+    # The last run is that of rods, which stands in the margin and has no fault here.
     program, *equations = plan_waterfall(THROW, STEPS)[:41]
     for planned in (program, *equations):
         how = {} if planned is program else {"method": "DOP853", "rtol": 1e-9}
@@ -138,8 +138,8 @@ def bars():
         assert trajectory is not None, planned.label
         # Twins say how wide a bar's band is, which is not asked here.
         runs |= dict.fromkeys([planned] if planned is program else [planned, *twins(planned)], trajectory)
-    column = column_run(THROW)
-    runs[column] = make(column).trajectory
+    rods = rods_run(THROW)
+    runs[rods] = make(rods).trajectory
     plateau = split_all(program, {run: observe(flight) for run, flight in runs.items()})[0]
     assert plateau.observable.name == "plateau"
     return {bar.name: bar.forward for bar in plateau.bars}

@@ -9,10 +9,10 @@ from made_up import study_map, trajectory_of
 import ode_reference
 from flipproof.chapters.maps.chapter import _beyond, _regions, _thrown_words, claims, figure_map, figures
 from flipproof.chapters.maps.study import (
-    COLUMN,
     EXTRA,
     LADDER,
     POINTS,
+    RODS,
     RUNGS,
     SCHEMES,
     SETS,
@@ -84,17 +84,17 @@ def test_a_model_runs_once_per_fill_along_the_step_axis():
     runs = plan_map(THROW, "step", FILLS, (0.01, 0.1, 0.5))
     solvers = [run.solver for run in runs]
     assert {solvers.count(name) for name in SCHEMES} == {6}
-    assert {solvers.count(name) for name in (*LADDER[1:], COLUMN)} == {2}
+    assert {solvers.count(name) for name in (*LADDER[1:], RODS)} == {2}
     steps = [run.settings["steps"] for run in runs if run.solver == "exact-step"]
     assert steps == [1001, 1001, 101, 101, 21, 21]  # omega_0 T = 10
 
 
-def test_the_column_runs_once_per_fill_along_the_restitution_that_it_does_not_know():
+def test_rods_run_once_per_fill_along_the_restitution_that_they_do_not_know():
     values = (0.1, 0.5, 0.9)
     runs = plan_map(THROW, "restitution", FILLS, values)
-    assert [run.solver for run in runs].count(COLUMN) == 2
-    study = made_up("restitution", values, lambda run: 0.7 if run.solver == COLUMN else run.scenario.restitution)
-    assert study.level[COLUMN] == pytest.approx(0.7)
+    assert [run.solver for run in runs].count(RODS) == 2
+    study = made_up("restitution", values, lambda run: 0.7 if run.solver == RODS else run.scenario.restitution)
+    assert study.level[RODS] == pytest.approx(0.7)
     assert study.overlap == pytest.approx(np.array([[-0.6, -0.6], [-0.2, -0.2], [0.2, 0.2]]))
     assert "In 0 of 0 cells" not in _beyond(study)
     assert "N = 6" in _beyond(study)
@@ -223,7 +223,7 @@ def test_a_real_map_agrees_with_the_reference_and_has_a_band():
     study = study_map(THROW, "gamma", FILLS, values, made)
     assert (study.reason == "").all()
     for column, fill in enumerate(FILLS):
-        for name in ("eq8", "free-flight", COLUMN):
+        for name in ("eq8", "free-flight", RODS):
             run = ode_reference.solve(vary(THROW, fill=fill), name)
             assert study.level[name][0, column] == pytest.approx(plateau(run.t, run.omega, THROW.omega0), abs=1e-4)
     assert set(study.level) == {*LADDER, *EXTRA}

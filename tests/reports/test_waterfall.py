@@ -33,7 +33,7 @@ def made_up(value: float) -> Trajectory:
 def split(value_of, *, program=0.0, moved=0.0, kind="twin 1"):
     runs = {}
     for run in plan_waterfall(THROW, 1000):
-        if run.solver in (waterfall.PROGRAM, waterfall.COLUMN):
+        if run.solver in (waterfall.PROGRAM, waterfall.RODS):
             runs[run] = observe(made_up(program if run.solver == waterfall.PROGRAM else 5.0))
             continue
         value = value_of(Switches.from_name(run.solver))
@@ -49,7 +49,7 @@ def plateau_bars(result):
 def test_the_plan_names_every_equation_once_and_gives_it_its_twins():
     runs = plan_waterfall(THROW, 1000)
     assert len(set(runs)) == len(runs) == 402
-    assert runs[-1] == waterfall.column_run(THROW)
+    assert runs[-1] == waterfall.rods_run(THROW)
     for k, usual in enumerate(runs[1:41]):
         own = ode_reference.solve(THROW, usual.solver).settings["rest_speed"]
         *changed, rest = runs[41 + 9 * k : 50 + 9 * k]
@@ -101,27 +101,27 @@ def test_every_split_of_every_observable_sums_to_the_whole():
 
 
 def test_overlap_stands_in_the_margin_and_takes_no_part_in_the_split():
-    """The column is a made-up 5 in every observable of the waterfall, whatever free flight is."""
+    """Rods are a made-up 5 in every observable of the waterfall, whatever free flight is."""
     plateau = split(lambda s: 1.0 if s.recoil else 0.0)[0]
-    assert (plateau.total, plateau.column, plateau.overlap) == pytest.approx((1.0, 5.0, 4.0))
+    assert (plateau.total, plateau.rods, plateau.overlap) == pytest.approx((1.0, 5.0, 4.0))
     assert plateau.finer_overlap is None
     claim = claim_overlap(plateau)
     assert (claim.id, claim.value) == ("waterfall-overlap", pytest.approx(4.0))
     assert "no share; free flight at N = 1" in claim.note
     labels = [label.get_text() for label in figure_waterfall(plateau).axes[0].get_yticklabels()]
-    assert labels[-1] == "no overlap: column"
+    assert labels[-1] == "no overlap: rods"
 
 
 def test_the_margin_is_that_of_direct_runs():
     throw = Scenario(n_slices=2, duration=0.2)
     runs = {run: observe(make(run).whole) for run in (*plan_waterfall(throw, 200), *plan_finer(throw, 200))}
     found = split_all(waterfall.program_run(throw, 200), runs)
-    column, few, many = (ode_reference.solve(throw.with_slices(n), m) for n, m in ((2, "column"), (2, FREE), (4, FREE)))
-    column, few, many = map(observe, (column, few, many))
+    rods, few, many = (ode_reference.solve(throw.with_slices(n), m) for n, m in ((2, "rods"), (2, FREE), (4, FREE)))
+    rods, few, many = map(observe, (rods, few, many))
     for part in found:
         name = part.observable.name
-        assert part.overlap == pytest.approx(column[name] - few[name], abs=1e-12)
-        assert part.finer_overlap == pytest.approx(column[name] - many[name], abs=1e-12)
+        assert part.overlap == pytest.approx(rods[name] - few[name], abs=1e-12)
+        assert part.finer_overlap == pytest.approx(rods[name] - many[name], abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["twin 1", "twin 8", "a tenth of the rest speed"])

@@ -244,7 +244,7 @@ def waterfall_csv(waterfalls: tuple[Waterfall, ...]) -> str:
                 for b in waterfall.bars
             ),
             [*what, "free flight", waterfall.end, "", "", waterfall.end_band, ""],
-            [*what, "column", waterfall.column, "", "", "", ""],
+            [*what, "rods", waterfall.rods, "", "", "", ""],
         ]
     return rows_csv(header, rows, digits=None)
 
@@ -258,6 +258,6 @@ def _table(waterfall: Waterfall) -> str:
     lines += [f"  {bar.forward:+8.4f}  {bar.backward:+8.4f}  {bar.average:+8.4f}  {bar.name}" for bar in waterfall.bars]
     lines += [
         f"  {waterfall.end:+8.4f}  {space}free flight (+- {waterfall.end_band:.1g})",
-        f"  {waterfall.overlap:+8.4f}  {space}column minus free flight: no overlap, no share",
+        f"  {waterfall.overlap:+8.4f}  {space}rods minus free flight: no overlap, no share",
     ]
     return "\n".join(lines)

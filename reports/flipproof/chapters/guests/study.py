@@ -28,9 +28,9 @@ from flipproof.chapters.waterfall.study import (
     Bar,
     Waterfall,
     bars_of,
-    column_run,
     equation_run,
     missed_by,
+    rods_run,
 )
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.contract import ForeignError
@@ -222,7 +222,7 @@ def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
     for start in starts:
         bars_of(differing(start), lambda names, start=start: ask(start, names), lambda _: 0.0)  # type: ignore[misc]
         ask(start, ())
-        asked[column_run(throw)] = None
+        asked[rods_run(throw)] = None
     return list(asked)
 
 
@@ -253,6 +253,6 @@ def split(visit: Visit, throw: Scenario, start: Switches, flights: Flights) -> W
         end_band=0.0,
         bars=bars,
         residual=missed_by(bars, own, end),
-        column=read(column_run(throw)),
+        rods=read(rods_run(throw)),
         solver=visit.guest.label,
     )

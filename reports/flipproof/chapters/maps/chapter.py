@@ -106,7 +106,7 @@ def _exhibit(study: ValidityMap) -> Exhibit:
         else (
             "the difference between the published program and free flight",
             "the published program is 1 % and 10 % of ω₀ off free flight, and where free flight, whose slices overlap, "
-            f"is that far off the column, which cannot overlap. {_beyond(study)}",
+            f"is that far off rods, which cannot overlap. {_beyond(study)}",
         )
     )
     counts = ", ".join(f"{name} {int((dominant == k).sum())}" for k, name in enumerate(RUNGS) if (dominant == k).any())
@@ -148,8 +148,8 @@ def _beyond(study: ValidityMap) -> str:
     known = np.isfinite(study.overlap) & np.isfinite(study.shares).all(axis=0)
     more = int((np.abs(study.overlap) > np.abs(study.shares).max(axis=0))[known].sum())
     return (
-        f"The change by overlap is the difference of two models, free flight at N = {study.slices} and the column, and "
-        "no fair share: the column has no assumptions of the ladder to mend. In "
+        f"The change by overlap is the difference of two models, free flight at N = {study.slices} and rods, and "
+        "no fair share: rods have no assumptions of the ladder to mend. In "
         f"{more} of {int(known.sum())} cells it is larger than the largest fair share"
     )
 

@@ -26,7 +26,7 @@ from flipproof.frame.solvers import Made, Run, make
 from flipproof.frame.twins import band, twins
 from ode_reference.models import LADDER as MODELS
 from ode_reference.models import MODELS as EQUATIONS
-from ode_reference.solver import COLUMN
+from ode_reference.solver import RODS
 from ode_reference.switches import Switches
 from slicemodel import Scenario
 from slicemodel.observables import plateau
@@ -50,14 +50,14 @@ SETS: Final = {
 }
 """Every set of assumptions mended -> the model that flies it, a rung of the ladder where there is one."""
 
-EXTRA: Final = ("exact-step", COLUMN)
-"""Beside the ladder: a scheme held against its own equation, and the column, water that cannot overlap.
+EXTRA: Final = ("exact-step", RODS)
+"""Beside the ladder: a scheme held against its own equation, and rods, water that cannot overlap.
 
-The column has no switches of the ladder: what it changes is no fair share.
+Rods have no switches of the ladder: what they change is no fair share.
 """
 
 SOLVERS: Final = tuple(dict.fromkeys((*LADDER, *EXTRA, *SETS.values())))
-"""What flies every cell: two schemes, 40 models and the column."""
+"""What flies every cell: two schemes, 40 models and rods."""
 
 LABELS: Final[Mapping[Axis, str]] = {
     "gamma": "damping rate γ / ω₀ [1]",
@@ -121,8 +121,8 @@ class ValidityMap:
 
     @property
     def overlap(self) -> FloatArray:
-        """What overlap changes: plateau of free flight, whose slices overlap, minus that of the column."""
-        return self.level[FREE] - self.level[COLUMN]
+        """What overlap changes: plateau of free flight, whose slices overlap, minus that of rods."""
+        return self.level[FREE] - self.level[RODS]
 
     @property
     def dominant(self) -> NDArray[np.int64]:
@@ -163,7 +163,7 @@ def cells(
 ) -> Iterator[tuple[tuple[int, int], dict[str, Run]]]:
     """Yield row and column of every cell of a map, row by row, and the run that it has of every solver.
 
-    A model does not know a step, nor the column the restitution: along that axis their runs of a fill fraction are one.
+    A model does not know a step, nor rods the restitution: along that axis their runs of a fill fraction are one.
     ``steps`` is the grid of a scheme where the map does not say another, ``points`` are the output times of a model;
     None: its own.
     """
@@ -175,7 +175,7 @@ def cells(
         scheme = {"steps": max(2, round(turn / value) + 1) if axis == "step" else steps, "store": "summary"}
         runs = {}
         for name in SOLVERS:
-            thrown = replace(scenario, restitution=0.0) if name == COLUMN and axis == "restitution" else scenario
+            thrown = replace(scenario, restitution=0.0) if name == RODS and axis == "restitution" else scenario
             label = f"map {axis}, row {row}, column {column}, {name}"
             runs[name] = Run(name, thrown, scheme if name in SCHEMES else usual, label)
         yield (row, column), runs

@@ -67,10 +67,11 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
 
 
 def claim_overlap(waterfall: Waterfall) -> Finding:
-    """From free flight, whose slices overlap, to the column, which cannot: the margin of the waterfall."""
+    """From free flight, whose slices overlap, to rods, which cannot: the margin of the waterfall."""
     finer = waterfall.finer_overlap
-    title = f"{waterfall.observable.words}: column minus free flight, what forbidding overlap changes"
-    note = f"a difference of two models, no share; free flight at N = {waterfall.slices}, the column has no slices"
+    title = f"{waterfall.observable.words}: rods minus free flight, what forbidding overlap changes"
+    note = f"a difference of two models, no share; free flight at N = {waterfall.slices}, "
+    note += "rods are infinitely many and do not bounce"
     note += f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""
     return observed("waterfall-overlap", title, waterfall.overlap, note=note, band=Band(waterfall.end_band, "twins"))
 
@@ -86,10 +87,10 @@ def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
         "all orders in which the assumptions can be mended; blue raises, orange lowers. Right: the same assumption in "
         "single orders. Where the marks lie apart the assumptions interact, and the bar of one order is not a share. "
         "Error bars are numerical. Below the dotted line, hatched: what forbidding overlap changes, from free flight, "
-        "whose slices overlap, to water as one column, which cannot. That is a difference of two models and no share.",
+        "whose slices overlap, to rods of water, which cannot. That is a difference of two models and no share.",
         alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
         f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {waterfall.largest.name}. "
-        f"From there to water as one column, which cannot overlap: {waterfall.overlap:+.3f}.",
+        f"From there to rods of water, which cannot overlap: {waterfall.overlap:+.3f}.",
         maker=figure_waterfall,
         data=(waterfall,),
         table=bars_csv(waterfall),
@@ -109,7 +110,7 @@ def bars_csv(waterfall: Waterfall) -> str:
               for b in waterfall.bars),
             ("(free flight)", waterfall.end, waterfall.end_band, waterfall.end, waterfall.end, waterfall.end_band,
              None, None),
-            ("(column, which cannot overlap)", waterfall.column, None, waterfall.column, waterfall.column, None, None,
+            ("(rods, which cannot overlap)", waterfall.rods, None, waterfall.rods, waterfall.rods, None, None,
              None),
         ),
     )  # fmt: skip
@@ -119,7 +120,7 @@ def bars_csv(waterfall: Waterfall) -> str:
 def figure_waterfall(waterfall: Waterfall) -> Figure:
     """Left: the fair shares, each bar from the value before to the value after. Right: the same in single orders.
 
-    Below, hatched: what forbidding overlap changes, from free flight to the column.
+    Below, hatched: what forbidding overlap changes, from free flight to rods.
     """
     figure, (ladder, orders) = new_figure(1, 2, size=(8.0, 4.9), sharey=True, width_ratios=(1.5, 1.0))
     names = [waterfall.solver, *(bar.name for bar in waterfall.bars), "free flight"]
@@ -147,7 +148,7 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
         axes.grid(visible=False, axis="y")
     place_of: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "fontsize": 8}
     orders.annotate("a difference of two models,\nno share", (0.02, 0), **place_of)
-    ladder.set_yticks([*places, 0], [*names, "no overlap: column"])
+    ladder.set_yticks([*places, 0], [*names, "no overlap: rods"])
     ladder.set_xlabel(f"{waterfall.observable.words} [{waterfall.observable.unit}]")
     ladder.set_title("fair shares: means over all orders", fontsize=10, loc="left")
     orders.axvline(0.0, color="#444444", linewidth=0.8)

@@ -8,9 +8,9 @@ them alike: an assumption's fair share. Each of the three sums to the whole diff
 order, or the largest bar of any order, is no share: another order gives another number. The step size comes first in
 every order: only the program has one.
 
-In the margin stands what forbidding overlap changes: free flight still lets slices overlap, one stretching column of
-water cannot (``ode_reference.column``). The column has no switches, so that it takes no part in the orders: column
-minus free flight is a difference of two models.
+In the margin stands what forbidding overlap changes: free flight still lets slices overlap, rods of water cannot
+(``ode_reference.rods``). Rods have no switches, so that they take no part in the orders: rods minus free flight is a
+difference of two models.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from flipproof.frame.equations import NAMES, canonical
 from flipproof.frame.shapley import changes_of, fair_shares, grouped_shares, mean, sets_before
 from flipproof.frame.solvers import Run, finer, make
 from flipproof.frame.twins import band, twins
-from ode_reference.solver import COLUMN
+from ode_reference.solver import RODS
 from ode_reference.switches import Switches
 from slicemodel import Scenario, Trajectory, observables
 
@@ -108,7 +108,7 @@ class Bar:
 class Waterfall:
     """The split of one observable at ``slices``; ``residual`` is the largest |total - sum of bars| of the splits.
 
-    ``column`` is the observable of water that cannot overlap, in the margin of the split; ``finer_end`` that of free
+    ``rods`` is the observable of water that cannot overlap, in the margin of the split; ``finer_end`` that of free
     flight at ``FINER`` times the slices, None if that was not computed. ``groupings`` are fair shares in other counts
     of what is one change, by the names of ``GROUPINGS``. ``solver`` is where the split begins.
     """
@@ -120,7 +120,7 @@ class Waterfall:
     end_band: float
     bars: tuple[Bar, ...]
     residual: float
-    column: float
+    rods: float
     finer_end: float | None = None
     groupings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     solver: str = "published program"
@@ -132,13 +132,13 @@ class Waterfall:
 
     @property
     def overlap(self) -> float:
-        """What forbidding overlap changes: column minus free flight, no share."""
-        return self.column - self.end
+        """What forbidding overlap changes: rods minus free flight, no share."""
+        return self.rods - self.end
 
     @property
     def finer_overlap(self) -> float | None:
         """The same at ``FINER`` times the slices; None if that was not computed."""
-        return None if self.finer_end is None else self.column - self.finer_end
+        return None if self.finer_end is None else self.rods - self.finer_end
 
     @property
     def largest(self) -> Bar:
@@ -163,15 +163,15 @@ def equation_run(throw: Scenario, switches: Switches) -> Run:
     return Run(name, throw, {}, f"waterfall, {name}")
 
 
-def column_run(throw: Scenario) -> Run:
+def rods_run(throw: Scenario) -> Run:
     """Return the run of water that cannot overlap."""
-    return Run(COLUMN, throw, {}, "waterfall, column")
+    return Run(RODS, throw, {}, "waterfall, rods")
 
 
 def plan_waterfall(throw: Scenario, steps: int) -> list[Run]:
-    """Return the program's run, every equation with its twins, and the column's (402 runs)."""
+    """Return the program's run, every equation with its twins, and that of rods (402 runs)."""
     equations = _plan_equations(throw)
-    return [program_run(throw, steps), *equations, *chain.from_iterable(map(twins, equations)), column_run(throw)]
+    return [program_run(throw, steps), *equations, *chain.from_iterable(map(twins, equations)), rods_run(throw)]
 
 
 def _plan_equations(throw: Scenario) -> list[Run]:
@@ -219,7 +219,7 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
         end_band=bands[everything],
         bars=tuple(bars),
         residual=missed_by(bars, start, values[everything]),
-        column=observed[column_run(program.scenario)],
+        rods=observed[rods_run(program.scenario)],
         finer_end=more[everything] if more else None,
         groupings={
             words: grouped_shares(groups, lambda made: values[mended(made)]) for words, groups in GROUPINGS.items()
