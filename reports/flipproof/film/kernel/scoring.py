@@ -127,3 +127,41 @@ def sums(missed, seen, slopes, variance, dv, log_good, log_bad):
         for m in range(k):
             information[m, k] = information[k, m]
     return cost, gradient, information
+
+
+@kept_on_disk()
+def turnings(angle, t, first, rates, rows, step, near):
+    """Return for every frame of ``first`` the turning that the angle follows best from there on, as rows (N, 5).
+
+    A row is its score, the index of its curve, omega_0, the angle at the release and the index of its last frame. Each
+    frame within ``near`` of the turning counts 1 less the square of its share of that; a turning ends where three of
+    four frames leave it. ``rates`` (N, M) are omega_0 to try, ``rows`` (C, 3, S) the curves.
+    """
+    best = np.zeros((len(first), 5))
+    for j in range(len(first)):
+        count = len(t) - first[j]
+        off = np.empty(count)
+        for m in range(rates.shape[1]):
+            omega0 = rates[j, m]
+            s = abs(omega0) * (t[first[j] :] - t[first[j]])
+            for c in range(len(rows)):
+                for i in range(count):
+                    k = min(int(s[i] / step), rows.shape[2] - 2)
+                    part = s[i] / step - k
+                    turned = rows[c, 0, k] + part * (rows[c, 0, k + 1] - rows[c, 0, k])
+                    off[i] = angle[first[j] + i] - math.copysign(turned, omega0) - angle[first[j]]
+                    off[i] -= 2 * math.pi * np.rint(off[i] / (2 * math.pi))
+                start = np.median(off[: min(5, count)])
+                score, end, left = 0.0, 0, 0
+                for i in range(count):
+                    away = off[i] - start
+                    away = abs(away - 2 * math.pi * np.rint(away / (2 * math.pi))) / near
+                    left = (left << 1 | (away > 1.0)) & 15
+                    if away < 1.0:
+                        score, end = score + 1.0 - away**2, i
+                    if (left & 1) + (left >> 1 & 1) + (left >> 2 & 1) + (left >> 3) >= 3:
+                        break
+                if end >= 5 and s[end] > 0.5 and score > best[j, 0]:
+                    best[j, 0], best[j, 1], best[j, 2] = score, c, omega0
+                    best[j, 3], best[j, 4] = start + angle[first[j]], first[j] + end
+    return best
