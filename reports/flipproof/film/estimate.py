@@ -46,6 +46,9 @@ FASTER: Final = np.geomspace(0.8, 2.5, 12)
 NEGLIGIBLE: Final = 9.0
 """Logarithm of how much less likely than the best a pair must be to be left out."""
 
+EDGE: Final = 5.0
+"""The same of a row at a grid's edge, beyond which the grid grows."""
+
 DRAWS: Final = 8000
 """Sets of parameters drawn from the posterior."""
 
@@ -200,7 +203,7 @@ def _grid(
     seeds, nearest = np.array([[np.nan, np.nan]]), [x]
     shape = COARSE
     film, began = likelihood.film, time.perf_counter()
-    for turn in range(12):
+    for turn in range(16):
         cell = (high - low) / shape
         axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
         nodes = np.array(list(product(*axes)))
@@ -219,8 +222,16 @@ def _grid(
         levels = np.array([fit.evidence for fit in fits])
         order = np.argsort(-levels)
         best = int(order[0])
-        if shape == FINE or time.perf_counter() - began > 0.5 * seconds:
+        if time.perf_counter() - began > 0.5 * seconds:
             break
+        if shape == FINE:
+            # Rows of a coarse grid lie beside a narrow ridge, which looks shorter then than it is.
+            grown = _grown(nodes, levels, cell, (low, high))
+            if np.array_equal(grown, (low, high)):
+                break
+            low, high = grown
+            seeds, nearest = nodes[order], [fits[k].x for k in order]
+            continue
         settled = settle(likelihood, curves[best], fits[best].x)
         if settled is not likelihood:
             likelihood = settled
@@ -249,6 +260,21 @@ def _grid(
         if np.prod((high - low) / wide) > 0.4:
             shape = FINE
     return likelihood, nodes, curves, fits, (float(cell[0]), float(cell[1])), shape == FINE
+
+
+def _grown(
+    nodes: FloatArray, levels: FloatArray, cell: FloatArray, box: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the box, half as long again towards each edge whose outermost row is likely."""
+    low, high = box[0].copy(), box[1].copy()
+    for k, last in enumerate((np.arcsinh(MAX_RATE / SCALE), 1.0)):
+        likely = nodes[levels > levels.max() - EDGE, k]
+        length = high[k] - low[k]
+        if likely.min() < low[k] + cell[k]:
+            low[k] = max(0.0, low[k] - 0.5 * length)
+        if likely.max() > high[k] - cell[k]:
+            high[k] = min(last, high[k] + 0.5 * length)
+    return low, high
 
 
 def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> tuple[Likelihood, FloatArray]:
