@@ -440,8 +440,8 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
         earthly.expected[8], earthly.stiffness[8] = -GRAVITY, 0.5**-2
         fit = earthly.fitted(curve, x, 8)
         settled = settle(earthly, curve, fit.x)
-        for touch, speed, begin in ((settled.touch, settled.speed, fit.x), (touch, TOUCH[1], x)):
-            better = _better(Likelihood(film, held, touch, noise, speed), curve, begin)
+        for when, speed, begin in ((settled.touch, settled.speed, fit.x), (touch, TOUCH[1], x)):
+            better = _better(Likelihood(film, held, when, noise, speed), curve, begin)
             if better[2][8] < 0.0:  # what accelerates upwards is no flight
                 tried.append(better)
     # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
@@ -464,7 +464,7 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
 
 
 def _off_gravity(x: FloatArray) -> float:
-    """Return the cost of a gravity unlike the earth's; it ends at 50: a clock or a stick far off is found all the same."""
+    """Return the cost of a gravity unlike the earth's; at most 50, so that a clock or stick far off is found, too."""
     return min(50.0, 0.5 * ((math.hypot(x[7], x[8]) / GRAVITY - 1.0) / 0.1) ** 2)
 
 
