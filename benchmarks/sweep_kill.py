@@ -102,8 +102,8 @@ def alive_in_session(session: int) -> list[int]:
 
 
 def left_over(session: int) -> list[int]:
-    """Return the processes of a session that have not ended some seconds after their parent."""
-    deadline = time.monotonic() + 10.0
+    """Return the processes of a session that have not ended within a minute of their parent."""
+    deadline = time.monotonic() + 60.0
     while (left := alive_in_session(session)) and time.monotonic() < deadline:
         time.sleep(0.05)
     return left

@@ -403,8 +403,8 @@ def test_a_program_does_not_outlive_a_killed_flipproof(tmp_path, places):
 
 
 def _until(condition):
-    for _ in range(600):
+    for _ in range(3000):
         if condition():
             return
         time.sleep(0.1)
-    raise AssertionError("not within a minute")
+    raise AssertionError("not within five minutes")

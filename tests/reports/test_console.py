@@ -24,7 +24,7 @@ def flipproof(place, *arguments, encoding="ascii", **settings):
     return subprocess.run(
         [sys.executable, "-m", "flipproof", *map(str, arguments)],
         cwd=place, env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": encoding}, capture_output=True,
-        text=True, encoding="utf-8", errors="replace", timeout=120, check=False, **settings,
+        text=True, encoding="utf-8", errors="replace", timeout=300, check=False, **settings,
     )  # fmt: skip
 
 
@@ -150,7 +150,7 @@ def test_an_endless_scenario_ends_at_once(tmp_path, endless):
     code = "import json, sys; from flipproof.cli.main import main; print([main(c) for c in json.loads(sys.argv[1])])"
     told = subprocess.run(
         [sys.executable, "-c", code, json.dumps(commands)],
-        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=300,
         check=False,
     )  # fmt: skip
     assert told.stdout == f"{[2] * len(commands)}\n"

@@ -90,26 +90,31 @@ def test_a_throw_of_its_own_keeps_all_its_fields(tmp_path):
 def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturbed_one(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     options = ["map", "--axis", "gamma", "--size", "5x4", "--slices", "3", "--jobs", "1"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "flipproof", *options, "--out", tmp_path / "killed"],
-        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
-    )  # fmt: skip
-    while process.poll() is None and not stored(tmp_path / "killed"):
-        time.sleep(0.005)
-    process.kill()
-    process.communicate(timeout=60)
-    there = len(stored(tmp_path / "killed"))
+    for attempt in range(3):
+        # On a machine too busy to look in time the map may be complete before the kill.
+        killed = tmp_path / f"killed-{attempt}"
+        process = subprocess.Popen(
+            [sys.executable, "-m", "flipproof", *options, "--out", killed],
+            cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+        )  # fmt: skip
+        while process.poll() is None and not stored(killed):
+            time.sleep(0.005)
+        process.kill()
+        process.communicate(timeout=300)
+        there = len(stored(killed))
+        if there < 20 * 42:
+            break
     assert 0 < there < 20 * 42
-    assert not (tmp_path / "killed" / "map.png").exists()
+    assert not (killed / "map.png").exists()
     with monkeypatch.context() as patch:
         patch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(SerialExecutor()))
-        status, out, _ = run(capsys, *options, "--out", tmp_path / "killed")
+        status, out, _ = run(capsys, *options, "--out", killed)
         assert status == 0
         assert f"; {there} were there\ncells by largest fair share: " in out
         assert run(capsys, *options, "--out", tmp_path / "whole")[0] == 0
-    assert stored(tmp_path / "killed") == stored(tmp_path / "whole")
+    assert stored(killed) == stored(tmp_path / "whole")
     for name in ("map.svg", "map.png", "map.csv", "map.json"):
-        assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+        assert (killed / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
 def stored(folder):

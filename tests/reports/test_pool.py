@@ -36,10 +36,10 @@ def die_with_run_2(runs):
 
 def test_a_call_whose_worker_died_once_is_made_again(tmp_path):
     with workers(1) as processes:
-        assert processes.submit(die_the_first_time, tmp_path / "mark").result(timeout=60) != os.getpid()
+        assert processes.submit(die_the_first_time, tmp_path / "mark").result(timeout=300) != os.getpid()
         with pytest.raises(WorkerDiedError, match="exit code -9"):
-            processes.submit(_always_die).result(timeout=60)
-        assert processes.submit(max, 1, 2).result(timeout=60) == 2
+            processes.submit(_always_die).result(timeout=300)
+        assert processes.submit(max, 1, 2).result(timeout=300) == 2
 
 
 def _always_die():
@@ -56,8 +56,8 @@ def test_a_worker_that_still_starts_does_not_die_of_an_interrupt():
         for _ in range(10):
             os.kill(children[-1].pid, signal.SIGINT)
             time.sleep(0.01)
-        assert future.result(timeout=60) == children[-1].pid
-        assert processes.submit(signal.pthread_sigmask, signal.SIG_BLOCK, ()).result(timeout=60) == set()
+        assert future.result(timeout=300) == children[-1].pid
+        assert processes.submit(signal.pthread_sigmask, signal.SIG_BLOCK, ()).result(timeout=300) == set()
 
 
 def test_only_the_run_that_kills_its_worker_is_lost_and_the_order_stays(monkeypatch):
@@ -79,7 +79,7 @@ def test_a_script_whose_workers_would_begin_it_anew_is_told_so(tmp_path):
         "with workers(2) as pool:\n"
         "    make_all(pool, [Run('eq8', Scenario(n_slices=n)) for n in range(1, 50)], lambda *_: None)\n"
     )
-    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=120, check=False)
+    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=300, check=False)
     assert ended.returncode == 1
     assert 'begin its work below `if __name__ == "__main__":`' in ended.stderr.splitlines()[-1]
 
