@@ -89,7 +89,7 @@ def test_a_bar_moves_on_a_terminal_and_leaves_nothing_behind():
     code = (
         "import time; from flipproof.cli.progress import progress_bar\n"
         "with progress_bar('drawing', 'frame') as step:\n"
-        "    time.sleep(1.2); step(1, 4); time.sleep(0.7)"
+        "    time.sleep(1.2); step(1, 4); time.sleep(2.0)"
     )
     drawn = on_a_terminal([sys.executable, "-c", code]).split("\r\x1b[K")
     assert len(drawn) >= 4
