@@ -31,7 +31,7 @@ import numpy as np
 import engine_check
 import ode_reference
 from engine_check.landing import LANDERS
-from ode_reference.landing import path
+from ode_reference.landing.land import path
 from slicemodel import Scenario, Table, Touch
 
 REFERENCE = "event-driven"
@@ -44,7 +44,7 @@ SPENT = 0.02
 """Time after the touch from which on the least distance from the saddle is read [s]."""
 
 
-def touches(count: int, n_slices: int, filling: float, frozen: bool, slices: str, seed: int) -> list[Touch]:
+def touches(count: int, n_slices: int, filling: float, frozen: bool, seed: int) -> list[Touch]:
     """Return touches within 35 degrees of upright."""
     random = np.random.default_rng(seed)
     found: list[Touch] = []
@@ -59,28 +59,21 @@ def touches(count: int, n_slices: int, filling: float, frozen: bool, slices: str
             theta0=math.pi / 2 + math.radians(5) * random.standard_normal(),
             launch_velocity=(0.5, 1.94 + 0.1 * random.standard_normal()),
         )
-        touch = ode_reference.fly(scenario, Table(height=random.uniform(-0.5, -0.3)), slices)
+        touch = ode_reference.fly(scenario, Table(height=random.uniform(-0.5, -0.3)))
         if abs(touch.tilt) < NEAR_UPRIGHT:
             found.append(touch)
     return found
 
 
-def closest_to_saddle(touch: Touch, table: Table, law: str | None, slices: str) -> float:
+def closest_to_saddle(touch: Touch, table: Table, law: str | None) -> float:
     """Return the least |E - E_s| / E_s of the reference while the bottle's spin is below 1 rad/s."""
-    run = path(touch, table, law, slices, duration=1.0)
+    run = path(touch, table, law, duration=1.0)
     slow = (np.abs(run.omega) < 1.0) & (run.t > SPENT)
     return float(np.min(np.abs(run.energy[slow] / run.saddle - 1), initial=math.inf))
 
 
-Case = tuple[str | None, str | None]
-CASES: dict[str, Case] = {
-    "ice": (None, None),
-    "together": ("exclude", "together"),
-    "in-turn": ("exclude", "in-turn"),
-    "staggered": ("staggered", "together"),
-    "staggered-in-turn": ("staggered", "in-turn"),
-}
-"""Kinds of slices and law by name; ice has neither."""
+CASES = {"ice": None, "together": "together", "in-turn": "in-turn"}
+"""Law by name; ice has none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,17 +98,16 @@ class Row:
         return self.coarse != self.fine and not {self.coarse, self.fine} & {"", "undecided"}
 
 
-def landed(name: str, found: list[Touch], case: Case, dt: float | None) -> list[Row]:
+def landed(name: str, found: list[Touch], law: str | None, dt: float | None) -> list[Row]:
     """Return the outcomes by one program."""
-    table, (slices, law) = Table(height=0.0), case
-    rows = []
+    table, rows = Table(height=0.0), []
     for touch in found:
         began = time.process_time()
         if name == REFERENCE:
-            outcome = ode_reference.land(touch, table, law, slices or "exclude")
+            outcome = ode_reference.land(touch, table, law)
         else:
-            outcome = engine_check.land(touch, table, name, dt, law=law, slices=slices or "exclude")
-        ends = outcome.diagnostics["outcomes"] if name == REFERENCE else outcome.diagnostics["outcomes"][0]
+            outcome = engine_check.land(touch, table, name, dt, law=law)
+        ends = outcome.diagnostics["outcomes"]
         seconds = time.process_time() - began
         rows.append(Row(outcome.outcome, outcome.certified, str(ends[0]), str(ends[1]), outcome.reason, seconds))
     return rows
@@ -140,7 +132,7 @@ class Rows:
 
 
 def land_all(
-    pool: Executor, rows: Rows, about: str, found: list[Touch], case: Case, names: list[str], dt: float | None
+    pool: Executor, rows: Rows, about: str, found: list[Touch], law: str | None, names: list[str], dt: float | None
 ) -> dict[str, list[Row]]:
     """Return the rows of every program that has this case, making those that are not there."""
     keys = {name: [f"{about}, {name}, {k}" for k in range(len(found))] for name in names}
@@ -149,7 +141,7 @@ def land_all(
         missing = [k for k, key in enumerate(of_touches) if key not in rows.made]
         for begin in range(0, len(missing), CHUNK):
             some = missing[begin : begin + CHUNK]
-            future = pool.submit(landed, name, [found[k] for k in some], case, dt)
+            future = pool.submit(landed, name, [found[k] for k in some], law, dt)
             pending[future] = [of_touches[k] for k in some]
     for future in as_completed(pending):
         for key, row in zip(pending[future], future.result(), strict=True):
@@ -157,10 +149,9 @@ def land_all(
     return {name: [rows.made[key] for key in of_touches] for name, of_touches in keys.items()}
 
 
-def compare(programs: dict[str, list[Row]], found: list[Touch], case: Case) -> list[dict[str, Any]]:
+def compare(programs: dict[str, list[Row]], found: list[Touch], law: str | None) -> list[dict[str, Any]]:
     """Print outcomes and disagreements of all programs; return the matrix of every pair."""
-    slices, law = case
-    table, slices = Table(height=0.0), slices or "exclude"
+    table = Table(height=0.0)
     for name, rows in programs.items():
         reasons = dict(Counter(row.reason for row in rows if row.reason))
         seconds = sum(row.seconds for row in rows) / len(rows)
@@ -173,7 +164,7 @@ def compare(programs: dict[str, list[Row]], found: list[Touch], case: Case) -> l
             pairs = list(zip(programs[one], programs[other], strict=True))
             differ = [k for k, (a, b) in enumerate(pairs) if a.decided and b.decided and a.outcome != b.outcome]
             both = sum(a.decided and b.decided for a, b in pairs)
-            near = [closest_to_saddle(found[k], table, law, slices) for k in differ]
+            near = [closest_to_saddle(found[k], table, law) for k in differ]
             missed = f", touches {differ}, saddle missed by {[f'{least:.1e}' for least in near]}" if near else ""
             print(f"      {one} / {other}: {len(differ)} of {both} differ{missed}", flush=True)
             matrices.append(
@@ -209,18 +200,24 @@ def main() -> int:
     with ProcessPoolExecutor(options.jobs) as pool:
         for filling in options.fillings:
             for name in options.cases:
-                slices, law = CASES[name]
-                found = touches(
-                    options.touches, options.n_slices, filling, slices is None, slices or "exclude", options.seed
-                )
+                law = CASES[name]
+                found = touches(options.touches, options.n_slices, filling, law is None, options.seed)
                 print(f"filling {filling:g}, {name}", flush=True)
                 about = f"{name}, filling {filling:g}, N {options.n_slices}, seed {options.seed}{step}"
                 names = [REFERENCE, *LANDERS]
-                programs = land_all(pool, rows, about, found, CASES[name], names, options.dt)
-                matrices = compare(programs, found, CASES[name])
+                programs = land_all(pool, rows, about, found, law, names, options.dt)
+                matrices = compare(programs, found, law)
                 total += sum(m["differ"] for m in matrices)
                 compared += len(found)
-                cases.append({"filling": filling, "slices": slices, "law": law, "dt": options.dt, "matrices": matrices})
+                cases.append(
+                    {
+                        "filling": filling,
+                        "slices": law and "exclude",
+                        "law": law,
+                        "dt": options.dt,
+                        "matrices": matrices,
+                    }
+                )
                 if options.json:
                     facts: dict[str, Any] = {"command": shlex.join(["python", *sys.argv])}
                     facts |= {"touches": options.touches, "n_slices": options.n_slices, "cases": cases}

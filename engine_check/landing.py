@@ -57,8 +57,6 @@ HALVINGS: Final = 4
 CHECK_EVERY: Final = 1e-3
 """Time between two looks at the energy [s]."""
 
-SLICES: Final = ("exclude", "staggered")
-
 ALOFT: Final = 1e-3
 LANDED: Final = 1e-4
 """Heights of the lowest corner beyond which the bottle is off the table, and below which it is on it again [m]."""
@@ -96,9 +94,8 @@ def land(
     dt: float | None = None,
     *,
     law: str | None = None,
-    slices: str = "exclude",
 ) -> Outcome:
-    """Land a bottle on a table in a rigid-body engine until its outcome is certain.
+    """Land a bottle on a table in a rigid-body engine until its outcome is certain; slices are rods that meet.
 
     Parameters
     ----------
@@ -111,8 +108,6 @@ def land(
         or gives energy, the step is halved again, ``HALVINGS`` times in all.
     law : str, optional
         A name in ``slicemodel.table.LAWS``; "together" by default. Ice has none.
-    slices : str
-        "exclude" or "staggered". Without effect on ice.
 
     Returns
     -------
@@ -132,16 +127,9 @@ def land(
     """
     if engine not in LANDERS:
         raise ValueError(unknown_name("engine =", engine, LANDERS))
-    if slices == "overlap":
-        raise ValueError(
-            "slices = 'overlap' is refused: overlapping slices at rest all sink to the base, which puts the centre of "
-            f"mass too low (admissible: {', '.join(SLICES)})"
-        )
     chosen = "together" if law is None else law
     if chosen not in LAWS:
         raise ValueError(unknown_name("law =", chosen, LAWS))
-    if slices not in SLICES:
-        raise ValueError(unknown_name("slices =", slices, SLICES))
     if touch.scenario.frozen and law is not None:
         raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
     default = ICE_STEP if immovable(touch.scenario) else STEP
@@ -149,7 +137,7 @@ def land(
 
     def run(touch: Touch, step: float, gap: float = CLOSED) -> Run:
         with no_log():
-            return landed(World(touch, table, step, chosen, slices, gap), touch.scenario, step)
+            return landed(World(touch, table, step, chosen, gap), touch.scenario, step)
 
     fine = run(touch, step)
     outcomes = [fine.outcome]
@@ -180,7 +168,6 @@ def land(
         settings={
             "engine": engine,
             "law": None if touch.scenario.frozen else chosen,
-            "slices": None if touch.scenario.frozen else slices,
             "dt": step,
             "height": table.height,
             "restitution": table.restitution,
@@ -303,17 +290,15 @@ def landed(body: World, scenario: Scenario, dt: float) -> Run:
 class World:
     """One bottle over a table, and what ``landing.landed`` asks of it."""
 
-    def __init__(
-        self, touch: Touch, table: Table, dt: float, law: str | None, slices: str, gap: float = CLOSED
-    ) -> None:
+    def __init__(self, touch: Touch, table: Table, dt: float, law: str | None, gap: float = CLOSED) -> None:
         scenario = touch.scenario
         self.slack = gap * scenario.bottle.length
         self.touch, self.table, self.dt, self.scenario = touch, table, dt, scenario
-        self.in_turn, self.chain = law == "in-turn", slices == "exclude"
+        self.in_turn = law == "in-turn"
         self.rigid = immovable(scenario)
         self.ledger, self.saddle = 0.0, Watch(scenario).saddle
         if not self.rigid:
-            refuse_misplaced(touch, slices)
+            refuse_misplaced(touch)
         world = release(scenario, dt)
         setup = verify(world, scenario, dt)
         self.model, self.data = world.model, world.data
@@ -365,8 +350,8 @@ class World:
         n = 0 if self.rigid else self.scenario.n_slices
         unit = np.eye(self.model.nv)[TUBE_DOFS:]
         low, high = (np.array(places[:n]) for places in stops(self.scenario))
-        if not self.chain or not n:
-            return np.concatenate([-unit, unit]), np.concatenate([high, -low])
+        if not n:
+            return unit[:0], high
         between = np.full(n - 1, -self.scenario.slice_height)
         gradient = np.concatenate([-unit[:1], unit[:-1] - unit[1:], unit[-1:]])
         return gradient, np.concatenate([high[:1], between, -low[-1:]])
@@ -509,7 +494,7 @@ def immovable(scenario: Scenario) -> bool:
     return scenario.frozen or high[0] - low[0] <= 1e-12 * scenario.bottle.length
 
 
-def refuse_misplaced(touch: Touch, slices: str) -> None:
+def refuse_misplaced(touch: Touch) -> None:
     """Raise ValueError if a slice lies where no slice that keeps its room can be, by more than 1e-9 L."""
     slack = 1e-9 * touch.scenario.bottle.length
     low, high = stops(touch.scenario)
@@ -519,10 +504,10 @@ def refuse_misplaced(touch: Touch, slices: str) -> None:
                 f"touch.r[{k}] = {place:.9g} m is outside [{low[k]:.9g}, {high[k]:.9g}] m, the room of slice {k} among "
                 f"{len(low)} that do not overlap"
             )
-        if slices == "exclude" and k and touch.r[k - 1] - place < touch.scenario.slice_height - slack:
+        if k and touch.r[k - 1] - place < touch.scenario.slice_height - slack:
             raise ValueError(
                 f"touch.r[{k - 1}] - touch.r[{k}] = {touch.r[k - 1] - place:.9g} m is below the length "
-                f"{touch.scenario.slice_height:.9g} m of a rod: take slices = 'staggered'"
+                f"{touch.scenario.slice_height:.9g} m of a rod"
             )
 
 

@@ -13,7 +13,7 @@ touched: the throw goes through ``engine_check.solve``, so that every engine is 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
@@ -88,9 +88,6 @@ class Rebound:
 def measure_restitution(
     engine: str = "pymunk",
     *,
-    coefficients: Sequence[float] = COEFFICIENTS,
-    ends: Sequence[str] = ENDS,
-    dt: float = STEP,
     slices: str = "overlap",
     knobs: Mapping[str, float] | None = None,
 ) -> tuple[Rebound, ...]:
@@ -100,12 +97,6 @@ def measure_restitution(
     ----------
     engine : str
         A name in ``ENGINES``.
-    coefficients : sequence of float
-        Restitutions asked for, in [0, 1].
-    ends : sequence of str
-        Of "base", "cap".
-    dt : float
-        Upper bound of the step [s].
     slices : str
         As in ``solve``.
     knobs : mapping, optional
@@ -114,8 +105,8 @@ def measure_restitution(
     Returns
     -------
     tuple of Rebound
-        One for each end and coefficient. A throw that diverges, or in which nothing turns back or stops, is
-        returned with its reason.
+        One for each of ``ENDS`` and of ``COEFFICIENTS``. A throw that diverges, or in which nothing turns back or
+        stops, is returned with its reason.
 
     Accuracy
     --------
@@ -123,14 +114,14 @@ def measure_restitution(
     speeds on both sides of it.
     """
     settings = {"slices": slices, **(knobs or {})}
-    return tuple(_rebound(engine, end, float(e), dt, settings) for end in ends for e in coefficients)
+    return tuple(_rebound(engine, end, e, settings) for end in ENDS for e in COEFFICIENTS)
 
 
-def _rebound(engine: str, end: str, e: float, dt: float, settings: Mapping[str, Any]) -> Rebound:
+def _rebound(engine: str, end: str, e: float, settings: Mapping[str, Any]) -> Rebound:
     side = 1.0 if end == "base" else -1.0
     throw = _throw(e, side)
     times = np.linspace(0.0, DURATION, round(DURATION / STEP) + 1)
-    run = run_engine(throw, engine, dt, times=times, **settings)
+    run = run_engine(throw, engine, STEP, times=times, **settings)
     nothing = Rebound(end=end, asked=e, measured=math.nan, speed_in=math.nan, speed_out=math.nan)
     if not run.ok:
         return replace(nothing, reason=run.message)

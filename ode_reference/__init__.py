@@ -13,9 +13,8 @@ if TYPE_CHECKING:
     from ode_reference.bands import estimate_band
     from ode_reference.combinations import model_of
     from ode_reference.impacts import LAWS
-    from ode_reference.landing import land
-    from ode_reference.landing_batch import land_batch
-    from ode_reference.landing_flight import fly, turn
+    from ode_reference.landing.flight import fly, turn
+    from ode_reference.landing.land import land
     from ode_reference.models import LADDER, MODELS
     from ode_reference.solver import solve, solve_batch, with_own_inertia
     from ode_reference.switches import Switches
@@ -30,7 +29,6 @@ __all__ = [
     "estimate_band",
     "fly",
     "land",
-    "land_batch",
     "model_of",
     "solve",
     "solve_batch",
@@ -45,13 +43,12 @@ _HOMES = {
     "MODELS": "ode_reference.models",
     "Switches": "ode_reference.switches",
     "estimate_band": "ode_reference.bands",
-    "fly": "ode_reference.landing_flight",
-    "land": "ode_reference.landing",
-    "land_batch": "ode_reference.landing_batch",
+    "fly": "ode_reference.landing.flight",
+    "land": "ode_reference.landing.land",
     "model_of": "ode_reference.combinations",
     "solve": "ode_reference.solver",
     "solve_batch": "ode_reference.solver",
-    "turn": "ode_reference.landing_flight",
+    "turn": "ode_reference.landing.flight",
     "with_own_inertia": "ode_reference.solver",
 }
 

@@ -10,7 +10,7 @@ import pytest
 
 from flipproof.build import Report, ask_of, build, gather_report
 from flipproof.chapters.solvers import WITNESSES
-from flipproof.chapters.work_precision.contenders import Asked, Effort, Grids
+from flipproof.chapters.work_precision.contenders import Effort, Grids
 from flipproof.frame.gather import Gathered
 from flipproof.frame.pool import SerialExecutor
 from flipproof.output.provenance import provenance
@@ -28,7 +28,7 @@ LOOPS = (
 WORK = Effort(
     schemes=Grids(6, (4, 6)),
     engines=Grids(4, (4,)),
-    methods={"DOP853": Asked((1e-3, 1e-5, 1e-7)), "LSODA": Asked((1e-3, 1e-5, 1e-7), ("eq8",))},
+    methods={"DOP853": (1e-3, 1e-5, 1e-7), "LSODA": (1e-3, 1e-5, 1e-7)},
 )
 """A small study of work and precision."""
 

@@ -174,7 +174,7 @@ FLOORS = (
     ("frame", "output", "curves"),
     ("foreign", "bounce"),
     ("sweep",),
-    ("landing", "film"),
+    ("film",),
     ("chapters", "paper"),
     ("page",),
     ("presets", "build", "check", "testing", "pytest_plugin"),

@@ -26,7 +26,7 @@ class InProcess(Runner):
         self.traits = traits_of(solver, name)
 
     def __call__(self, ask: Ask) -> Answer:
-        """Return the checked answer; whatever the solver raises is its failure, as in a process of its own."""
+        """Return the checked answer; what the solver raises is raised: a bug in what is planted is no finding."""
         try:
             return answer_of(ask, self.solve(ask))
         except AnswerError as error:

@@ -399,7 +399,7 @@ def caps_not_in_the_space(world):
 
 def test_a_slice_that_meets_no_end_has_no_restitution(seed):
     seed(caps_not_in_the_space)
-    for rebound in measure_restitution(coefficients=(0.5,)):
+    for rebound in measure_restitution():
         assert not rebound.holds
         assert rebound.to_mapping()["measured"] is None
         assert rebound.reason

@@ -10,7 +10,7 @@ import engine_check
 import ode_reference
 from engine_check import landing
 from engine_check.landing import ALMOST_CLOSED, Run, Watch, World, landed
-from ode_reference.landing import path, world_of
+from ode_reference.landing.land import path, world_of
 from slicemodel import Bottle, Scenario, Table, Touch
 
 WATER = Scenario(n_slices=6, drag=0.0, water_mass=0.4)
@@ -31,9 +31,9 @@ def at_rest(scenario, tilt=0.0, omega=0.0, velocity=(0.0, 0.0), r=None):
     )
 
 
-def rebound(touch, law="together", slices="exclude", dt=1e-5):
+def rebound(touch, law="together", dt=1e-5):
     """Speed of the middle upwards, over that downwards, 1 ms after a flat touch at 2 m/s."""
-    world = World(touch, FLAT, dt, law, slices)
+    world = World(touch, FLAT, dt, law)
     heights = []
     for _ in range(round(3e-3 / dt)):
         assert not world.advance()
@@ -50,12 +50,11 @@ def test_ice_rebounds_with_the_restitution_of_the_table():
     assert rebound(at_rest(ICE, velocity=(0.0, -2.0))) == pytest.approx(0.3, abs=3e-3)
 
 
-@pytest.mark.parametrize("slices", ["exclude", "staggered"])
-def test_water_that_rests_on_the_base_rebounds_with_it(slices):
+def test_water_that_rests_on_the_base_rebounds_with_it():
     """Bottle and water strike together: the restitution between them plays no part."""
     for restitution in (0.0, 0.9):
         start = at_rest(replace(WATER, restitution=restitution), velocity=(0.0, -2.0))
-        assert rebound(start, slices=slices) == pytest.approx(0.3, abs=7e-3)
+        assert rebound(start) == pytest.approx(0.3, abs=7e-3)
 
 
 def test_in_turn_the_bottle_stays_down():
@@ -75,7 +74,7 @@ def test_the_watch_has_the_saddle_of_water_at_rest(scenario):
 def test_the_watch_and_the_reference_find_one_saddle():
     for scenario in (WATER, ICE):
         watch = Watch(scenario)
-        world = world_of(at_rest(scenario), FLAT, "together", "exclude")
+        world = world_of(at_rest(scenario), FLAT, "together")
         assert watch.saddle == pytest.approx(world.saddle, rel=1e-12, abs=0)
         assert (watch.lean, math.pi - watch.lean_on_cap) == pytest.approx((world.upright, world.cap), rel=1e-12, abs=0)
 
@@ -129,7 +128,7 @@ BOUNCY = Table(height=0.0, restitution=0.8, friction=0.8)
 
 def test_a_stack_on_the_base_throws_back_what_strikes_it_as_in_the_reference():
     step, count = 2e-5, 10
-    world = World(STACK, BOUNCY, step, "together", "exclude", ALMOST_CLOSED)
+    world = World(STACK, BOUNCY, step, "together", ALMOST_CLOSED)
     for _ in range(count):
         world.advance()
     motion = path(STACK, BOUNCY, dt=step / 2, every=step, duration=(count + 1) * step)
@@ -161,7 +160,7 @@ def test_a_mirrored_touch_lands_as_its_mirror_image(law):
         results = []
         for side in (1, -1):
             start = at_rest(replace(WATER, n_slices=3), side * tilt, side * omega, (side * velocity[0], velocity[1]))
-            results.append(landed(World(start, FLAT, 2e-4, law, "exclude"), start.scenario, 2e-4))
+            results.append(landed(World(start, FLAT, 2e-4, law), start.scenario, 2e-4))
         right, left = results
         assert (left.outcome, left.time) == (right.outcome, right.time)
         assert left.slid == pytest.approx(-right.slid, rel=1e-7, abs=0)
@@ -271,7 +270,6 @@ def test_a_world_that_is_not_the_one_meant_is_refused(monkeypatch):
         ({"dt": 0.01}, r"dt = 0.01 s is outside \(0, 0.001\) s"),
         ({"dt": math.nan}, "dt = nan"),
         ({"law": "after"}, "law = 'after' is unknown"),
-        ({"slices": "overlap"}, "slices = 'overlap' is refused: .* centre of mass"),
     ],
 )
 def test_bad_arguments_are_refused_by_name_and_range(changes, words):
@@ -291,7 +289,7 @@ def test_a_slice_that_strikes_the_base_of_a_bottle_that_stands_on_its_rim_reboun
     """The table holds the tube: relative to it the slice leaves with e times its speed, in both programs."""
     throw = Scenario(water_mass=0.2, n_slices=1, restitution=0.5, drag=0.0)
     standing = replace(at_rest(throw, tilt=0.05, r=np.array([0.24])), v=np.array([1.0]))  # 12 mm over the base
-    world, before = World(standing, FLAT, STEP, law, "exclude"), 1.0
+    world, before = World(standing, FLAT, STEP, law), 1.0
     while world.data.qvel[-1] > 0.0:
         before = world.data.qvel[-1]
         assert world.advance() == ""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from ode_reference.landing_core.impulses import coulomb
+from ode_reference.landing.impulses import coulomb
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ from scipy.integrate import quad
 
 import engine_check
 import ode_reference
-from ode_reference.landing import path, world_of
-from slicemodel import Bottle, Outcome, Scenario, ScenarioError, Table, Touch, touch
+from ode_reference.landing.land import path, world_of
+from slicemodel import Bottle, Scenario, ScenarioError, Table, Touch, touch
 from slicemodel.observables import static_toppling_angle
 
 G = 9.81
@@ -97,10 +97,9 @@ def test_a_uniform_block_rocks_as_housner_says():
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.7])
 @pytest.mark.parametrize("scenario", [ICE, WATER, replace(WATER, restitution=0.9)])
-@pytest.mark.parametrize("slices", ["exclude", "staggered"])
-def test_a_flat_drop_rebounds_to_e_squared_of_its_height(scenario, restitution, slices):
+def test_a_flat_drop_rebounds_to_e_squared_of_its_height(scenario, restitution):
     """Water that rests on the base counts, and its own restitution does not, if both strike together."""
-    run = path(at_rest(scenario), Table(height=0.0, restitution=restitution), slices=slices, drop=0.05, duration=0.25)
+    run = path(at_rest(scenario), Table(height=0.0, restitution=restitution), drop=0.05, duration=0.25)
     height = run.centre[:, 1] - scenario.bottle.length / 2
     down = math.sqrt(2 * 0.05 / G)
     assert height[run.t > down + 2e-3].max() / 0.05 == pytest.approx(restitution**2, abs=1e-3)
@@ -238,11 +237,10 @@ def test_its_flight_is_that_of_the_rods(n):
 
 
 @pytest.mark.parametrize("law", ["together", "in-turn"])
-@pytest.mark.parametrize("slices", ["exclude", "staggered"])
-def test_the_energy_never_rises(law, slices):
+def test_the_energy_never_rises(law):
     scenario = replace(WATER, water_mass=0.3, drag=0.2)
     start = at_rest(scenario, 0.3, 9.0, (0.4, -2.0))
-    run = path(start, Table(height=0.0), law, slices, duration=0.4)
+    run = path(start, Table(height=0.0), law, duration=0.4)
     assert np.diff(run.energy).max() < 1e-5 * run.saddle
     assert run.energy[-1] < run.saddle < run.energy[0]
 
@@ -251,8 +249,7 @@ def test_the_saddle_is_that_of_water_at_rest_not_of_the_touch():
     scenario = replace(WATER, water_mass=0.3)
     spread = scenario.bottle.length - (np.arange(10) + 0.5) / 10 * scenario.bottle.length
     low, high = (
-        world_of(at_rest(scenario, r=r), Table(height=0.0), "together", "exclude")
-        for r in (scenario.initial_positions(), spread)
+        world_of(at_rest(scenario, r=r), Table(height=0.0), "together") for r in (scenario.initial_positions(), spread)
     )
     assert low.saddle == high.saddle
     mass, _, _, rho, _ = block(scenario)
@@ -272,7 +269,7 @@ def test_ice_that_stands_on_its_cap_is_certain(program):
 
 
 def flown(seed, **changes):
-    """Touches of scattered throws of a column, which both kinds of slices can land."""
+    """Touches of scattered throws of a column, which rods can land."""
     random = np.random.default_rng(seed)
     throw = Scenario(**({"n_slices": 10, "water_mass": 0.4, "drag": 0.2, "duration": 1.0} | changes))
     throw = replace(
@@ -285,12 +282,11 @@ def flown(seed, **changes):
     return touch(ode_reference.solve(throw, model="column"), table), table
 
 
-@pytest.mark.parametrize("slices", ["exclude", "staggered"])
-def test_a_full_bottle_lands_like_ice(slices):
+def test_a_full_bottle_lands_like_ice():
     for seed in range(50):
         full, table = flown(seed, water_mass=1.0)
         ice = replace(full, scenario=replace(full.scenario, frozen=True), v=np.zeros(10))
-        one, other = ode_reference.land(full, table, slices=slices), ode_reference.land(ice, table)
+        one, other = ode_reference.land(full, table), ode_reference.land(ice, table)
         assert one.decided
         assert (one.outcome, one.certified, one.margin) == (other.outcome, other.certified, other.margin)
 
@@ -342,8 +338,6 @@ def test_a_mirrored_throw_lands_alike():
     ("changes", "words"),
     [
         ({"law": "after"}, "law = 'after' is unknown"),
-        ({"slices": "overlap"}, "slices = 'overlap' is refused: .* centre of mass"),
-        ({"slices": "rods"}, "slices = 'rods' is unknown"),
         ({"dt": 0.1}, r"dt = 0.1 s is outside \[1e-06, 0.001\] s"),
         ({"dt": math.nan}, "dt = nan"),
     ],
@@ -367,7 +361,6 @@ def test_overlapping_slices_are_refused_by_their_place():
     close[6] += 0.005
     with pytest.raises(ValueError, match=r"touch\.r\[5\] - touch\.r\[6\]"):
         ode_reference.land(at_rest(WATER, r=close), Table(height=0.0))
-    assert isinstance(ode_reference.land(at_rest(WATER, r=close), Table(height=0.0), slices="staggered"), Outcome)
 
 
 def test_nothing_lands_without_gravity():

@@ -134,6 +134,11 @@ MISTAKES = {
         "free fall",
         "9.9081 m/s^2 where 9.81",
     ),
+    "first row left out": (
+        answered(lambda t, y, v: (t[1:], y[1:], v[1:])),
+        "contract",
+        "t begins at 0.001 s, not at 0",
+    ),
     "thrown at rest": (changed(speed=lambda q: min(q["speed"], 0.0)), "contract", "v begins at 0 m/s where 2"),
     "floor 1 cm high": (
         lambda h, *asked: (lambda t, y, v: (t, y + 0.01, v))(*located(h - 0.01, *asked)),
@@ -158,6 +163,57 @@ MISTAKES = {
         "hangs on the phase",
     ),
 }
+
+
+def spring(stiffness=1e6, step=1e-5):
+    """Return a bouncer whose contact is a spring: elastic, converged at every step, and never instantaneous."""
+
+    def drop(height, speed, restitution, gravity, dt, duration):
+        y, v, rows = height, speed, [(height, speed)]
+        count = round(dt / step)
+        for _ in range(round(duration / dt)):
+            for _ in range(count):
+                pull = -gravity - stiffness * min(y, 0.0) * (1.0 if v < 0 else restitution**2)
+                v += step * pull
+                y += step * v
+            rows.append((y, v))
+        return dt * np.arange(len(rows)), *map(np.array, zip(*rows, strict=True))
+
+    return drop
+
+
+def test_a_soft_contact_is_called_soft_and_no_matter_of_the_step():
+    made = MEASURES["time of hit"](Adapter("spring", spring()), 1e-3)
+    assert made.remark == "a contact takes 3.1 ms, also at a quarter of the step: it is soft"
+
+
+def test_a_body_that_still_goes_down_has_no_restitution_yet():
+    def creeping(height, speed, restitution, gravity, dt, duration):
+        t, y, v = located(height, speed, restitution, gravity, dt, duration)
+        slow = speed > -0.03 and gravity == 0
+        return (t, height + speed * t, np.full(len(t), speed)) if slow else (t, y, v)
+
+    remarks = passport(Adapter("creeping", creeping)).remarks
+    words = "a body of 0.02 m/s with e = 0 still goes down 0.15 s after its hit; nothing rebounds below 0.0299 m/s"
+    assert remarks == {"restitution": words}
+
+
+def test_the_numbers_asked_do_not_hide_an_engine_of_float32():
+    def drop(*asked):
+        t, y, v = located(*asked)
+        return t, y, np.concatenate([v[:1], v[1:].astype(np.float32)])
+
+    assert MEASURES["precision"](Adapter("single", drop), 1e-3).numbers["bits"] == 32
+
+
+def test_a_body_that_sinks_does_not_hop():
+    def sinking(height, speed, restitution, gravity, dt, duration):
+        t, y, v = located(height, speed, restitution, gravity, dt, duration)
+        rests = (y == 0) & (v == 0)
+        return t, y - 0.01 * np.cumsum(rests) * dt, v - 0.01 * rests
+
+    remark = MEASURES["rest"](Adapter("sinking", sinking), 1e-3).remark
+    assert remark == "half a second after its last exact impact the body still sinks 5 mm"
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
@@ -236,6 +292,15 @@ def test_engines_of_the_project_have_a_passport(engine):
 def test_an_answer_that_is_no_flight_is_named(answer, words):
     with pytest.raises(AdapterError, match=words):
         Adapter("bad", lambda *_: answer).drop(1.0, 0.0, 0.5, 9.81, 1e-3, 0.2)
+
+
+def test_what_an_adapter_raises_is_its_own_failure_with_the_question_and_the_place():
+    def drop(height, *_):
+        raise RuntimeError(f"no convergence at {height}")
+
+    words = r"^\(height=1, .*, duration=0.2\) raised RuntimeError: no convergence at 1.0 \(test_bounce.py, line \d+\)$"
+    with pytest.raises(AdapterError, match=words):
+        Adapter("bad", drop).drop(1.0, 0.0, 0.5, 9.81, 1e-3, 0.2)
 
 
 @pytest.mark.parametrize("spec", ["nothing", "nowhere.py:drop", "cmd:true {effort}", "cmd:false", "cmd:echo x"])

@@ -16,6 +16,7 @@ from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
 from flipproof.chapters.landing.chapter import chunks, claims
 from flipproof.chapters.landing.figures import figure_map, figures, map_csv, page, shares_csv, witnesses
+from flipproof.chapters.landing.single import land_throw, told
 from flipproof.chapters.landing.study import (
     AIMING,
     Key,
@@ -28,14 +29,23 @@ from flipproof.chapters.landing.study import (
     share_of,
     standing,
 )
+from flipproof.chapters.landing.throws import (
+    Case,
+    Scatter,
+    Share,
+    Throws,
+    aimed,
+    correlation,
+    make_cases,
+    scattered,
+    wilson,
+)
+from flipproof.chapters.landing.work import Landed, flown, make_landing, saddle, touch_readings
 from flipproof.cli.main import main
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.gather import evaluate
 from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.run_store import RunStore
-from flipproof.landing.design import Case, Scatter, Share, Throws, aimed, correlation, make_cases, scattered, wilson
-from flipproof.landing.throw import land_throw, told
-from flipproof.landing.work import Landed, flown, make_landing, saddle, touch_readings
 from flipproof.presets.upright import make_upright
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.work import keyed

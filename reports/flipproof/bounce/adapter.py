@@ -15,12 +15,16 @@ class or object that has it, with ``line`` if it likes and ``settings``, a mappi
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from slicemodel.scenario import shortened
 
 FloatArray = NDArray[np.float64]
 Drop = Callable[[float, float, float, float, float, float], tuple[FloatArray, FloatArray, FloatArray]]
@@ -65,9 +69,10 @@ class Adapter:
         Raises
         ------
         AdapterError
-            If they are no flight of the duration asked.
+            If the adapter raises anything, or they are no flight of the duration asked.
         """
-        answer = self.ask_drop(*map(float, (height, speed, restitution, gravity, dt, duration)))
+        asked = map(float, (height, speed, restitution, gravity, dt, duration))
+        answer = _answer(self.ask_drop, dict(zip(PLACES, asked, strict=True)))
         t, y, v = _arrays(answer, ("t", "y", "v"), (1, 1, 1))
         _check_times(t, dt, duration)
         return t, y, v
@@ -83,13 +88,34 @@ class Adapter:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return t, shape (P,), x and v, shape (P, bodies), of bodies on a line."""
         assert self.ask_line is not None
-        t, x, v = _arrays(
-            self.ask_line(masses, positions, velocities, restitution, dt, duration), ("t", "x", "v"), (1, 2, 2)
-        )
+        asked = {
+            "masses": masses,
+            "positions": positions,
+            "velocities": velocities,
+            "restitution": restitution,
+            "dt": dt,
+            "duration": duration,
+        }
+        t, x, v = _arrays(_answer(self.ask_line, asked), ("t", "x", "v"), (1, 2, 2))
         if x.shape[1] != len(masses):
             raise AdapterError(f"line: x has {x.shape[1]} columns for {len(masses)} bodies")
         _check_times(t, dt, duration)
         return t, x, v
+
+
+def _answer(call: Callable[..., Any], asked: Mapping[str, Any]) -> Any:
+    """Return what an adapter answers; what it raises becomes an AdapterError with the question and the place."""
+    try:
+        return call(*asked.values())
+    except AdapterError:
+        raise
+    except Exception as error:  # of somebody else's code
+        question = ", ".join(
+            f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value}" for name, value in asked.items()
+        )
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        words = shortened(f"{type(error).__name__}: {error}", 200)
+        raise AdapterError(f"({question}) raised {words} ({Path(place.filename).name}, line {place.lineno})") from error
 
 
 def _arrays(answer: Any, names: Sequence[str], dimensions: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -117,7 +143,10 @@ def _numbers(name: str, part: ArrayLike) -> FloatArray:
 
 
 def _check_times(t: FloatArray, dt: float, duration: float) -> None:
-    if len(t) < 2 or not (np.diff(t) > 0).all():
-        raise AdapterError("t does not increase")
+    if len(t) < 2:
+        raise AdapterError(f"t has {len(t)} entries; those from 0 to {duration:.6g} s are needed")
+    if not (np.diff(t) > 0).all():
+        k = int(np.argmin(np.diff(t) > 0))
+        raise AdapterError(f"t does not increase: t[{k}] = {t[k]:.6g} s, t[{k + 1}] = {t[k + 1]:.6g} s")
     if not abs(t[-1] - duration) <= 1.5 * dt:
         raise AdapterError(f"t ends at {t[-1]:.6g} s; {duration:.6g} s were asked")

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from flipproof.frame.chapter import Chapter, Part
+if TYPE_CHECKING:
+    from flipproof.frame.chapter import Chapter, Part
 
 CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("assumptions", "What each assumption costs",
@@ -60,6 +61,8 @@ more, ``measured``, before these.
 
 def parts() -> tuple[Part, ...]:
     """Return what a report consists of, its chapters imported."""
+    from flipproof.frame.chapter import Part  # loads matplotlib, which a worker that lands bottles does not need
+
     return tuple(Part(anchor, title, says, tuple(map(_chapter, names))) for anchor, title, says, names in CONTENTS)
 
 
@@ -73,5 +76,7 @@ def _chapter(name: str) -> Chapter[Any]:
 
 def chapters_named(*names: str) -> tuple[Part, ...]:
     """Return a part with these chapters alone, for a command that needs no more."""
+    from flipproof.frame.chapter import Part
+
     by_name = {chapter.name: chapter for part in parts() for chapter in part.chapters}
     return (Part("", "", "", tuple(by_name[name] for name in names)),)

@@ -81,10 +81,10 @@ def _add_table(command: argparse.ArgumentParser) -> None:
 def command_land(options: argparse.Namespace) -> int:
     """Throw one bottle on a table and say how it lands."""
     throw = read_scenario(options.scenario, options.slices)
+    from flipproof.chapters.landing.single import land_throw, told
     from flipproof.chapters.landing.study import standing
+    from flipproof.chapters.landing.throws import aimed
     from flipproof.frame.beside import beside
-    from flipproof.landing.design import aimed
-    from flipproof.landing.throw import land_throw, told
     from slicemodel import Table
 
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
@@ -105,7 +105,7 @@ def command_upright(options: argparse.Namespace) -> int:
     """Make the throws of the study that have no row yet, and write its tables and figures."""
     throw = read_scenario(options.scenario, options.slices or SLICES)
     from flipproof.chapters.landing.study import Size
-    from flipproof.landing.design import FAMILIES, Scatter
+    from flipproof.chapters.landing.throws import FAMILIES, Scatter
     from flipproof.presets.upright import make_upright
     from flipproof.sweep.errors import refuse_unknown
     from slicemodel import Table

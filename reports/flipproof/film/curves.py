@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from flipproof.film.kernel.scoring import curve_at
 from flipproof.frame.others import OTHERS
 from flipproof.frame.solvers import catalogue, find, solve
 from ode_reference.solver import WATERS
@@ -30,6 +31,8 @@ STEP: Final = 0.025
 CHANGE: Final = 0.01
 """Relative change of omega_0, and change of theta_0 [rad], over which slopes of weighted equations are taken."""
 
+UNWEIGHTED: Final = np.empty((0, 3, 0))
+"""No slopes."""
 
 Flown = tuple[FloatArray, FloatArray, FloatArray]
 """theta, omega and r_CM of one flight."""
@@ -52,25 +55,8 @@ class Curve:
 
         Before s = 0 the water rests.
         """
-        k = np.clip((s / STEP).astype(int), 0, self.rows.shape[1] - 2)
-        x = np.maximum(s / STEP - k, 0.0)
-        (f0, w0, r0), (f1, w1, r1) = self.rows[:, k], self.rows[:, k + 1]
-        x = np.minimum(x, 1.0)
-        rise, y = f1 - f0, 1.0 - x
-        late = np.maximum(s - STEP * (self.rows.shape[1] - 1), 0.0)
-        turned = f0 + x * rise + x * y * (y * (STEP * w0 - rise) - x * (STEP * w1 - rise)) + late * w1
-        rest = s < 0
-        out = np.array(
-            [np.where(rest, s, turned), np.where(rest, 1.0, y * w0 + x * w1), y * r0 + x * r1,
-             np.where(rest, 0.0, (r1 - r0) / STEP), *np.zeros((4, len(s)))]
-        )  # fmt: skip
-        if self.slopes is not None:
-            low, high = self.slopes[:, :, k], self.slopes[:, :, k + 1]
-            slope = np.where(rest, 0.0, y * low + x * high)
-            d = np.array([np.log(omega0 / self.omega0), theta0 - self.theta0])
-            out[:3] += np.tensordot(d, slope, 1)
-            out[4:] = slope[0, 0], slope[0, 2], slope[1, 0], slope[1, 2]
-        return out
+        moved = np.array([np.log(abs(omega0) / abs(self.omega0)), theta0 - self.theta0])
+        return np.asarray(curve_at(self.rows, UNWEIGHTED if self.slopes is None else self.slopes, STEP, moved, s))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from flipproof.film.curves import SLICES, Curve, Equation
+from flipproof.film.curves import SLICES, STEP, Curve, Equation
+from flipproof.film.kernel.scoring import turnings
 from flipproof.film.likelihood import GRAVITY, HAND, TOUCH, Film, Fit, Held, Likelihood
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
@@ -39,8 +40,14 @@ FINE: Final = (11, 17)
 FEW: Final = 4
 """Nodes that matter at the least before a grid is believed to have seen all that does."""
 
+FASTER: Final = np.geomspace(0.8, 2.5, 12)
+"""omega_0 in units of the angular velocity in the first frames, which the water slows down within them."""
+
 NEGLIGIBLE: Final = 9.0
 """Logarithm of how much less likely than the best a pair must be to be left out."""
+
+EDGE: Final = 5.0
+"""The same of a row at a grid's edge, beyond which the grid grows."""
 
 DRAWS: Final = 8000
 """Sets of parameters drawn from the posterior."""
@@ -196,7 +203,7 @@ def _grid(
     seeds, nearest = np.array([[np.nan, np.nan]]), [x]
     shape = COARSE
     film, began = likelihood.film, time.perf_counter()
-    for turn in range(12):
+    for turn in range(16):
         cell = (high - low) / shape
         axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
         nodes = np.array(list(product(*axes)))
@@ -215,8 +222,16 @@ def _grid(
         levels = np.array([fit.evidence for fit in fits])
         order = np.argsort(-levels)
         best = int(order[0])
-        if shape == FINE or time.perf_counter() - began > 0.5 * seconds:
+        if time.perf_counter() - began > 0.5 * seconds:
             break
+        if shape == FINE:
+            # Rows of a coarse grid lie beside a narrow ridge, which looks shorter then than it is.
+            grown = _grown(nodes, levels, cell, (low, high))
+            if np.array_equal(grown, (low, high)):
+                break
+            low, high = grown
+            seeds, nearest = nodes[order], [fits[k].x for k in order]
+            continue
         settled = settle(likelihood, curves[best], fits[best].x)
         if settled is not likelihood:
             likelihood = settled
@@ -245,6 +260,21 @@ def _grid(
         if np.prod((high - low) / wide) > 0.4:
             shape = FINE
     return likelihood, nodes, curves, fits, (float(cell[0]), float(cell[1])), shape == FINE
+
+
+def _grown(
+    nodes: FloatArray, levels: FloatArray, cell: FloatArray, box: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the box, half as long again towards each edge whose outermost row is likely."""
+    low, high = box[0].copy(), box[1].copy()
+    for k, last in enumerate((np.arcsinh(MAX_RATE / SCALE), 1.0)):
+        likely = nodes[levels > levels.max() - EDGE, k]
+        length = high[k] - low[k]
+        if likely.min() < low[k] + cell[k]:
+            low[k] = max(0.0, low[k] - 0.5 * length)
+        if likely.max() > high[k] - cell[k]:
+            high[k] = min(last, high[k] + 0.5 * length)
+    return low, high
 
 
 def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> tuple[Likelihood, FloatArray]:
@@ -390,42 +420,37 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
         raise NoFlightError(f"{film.label}: cap and base were clicked together in {len(known)} frames; 8 are needed")
     step = float(np.median(np.diff(t)))
     equation = Equation("free-flight", throw, 30.0)
-    rates = np.array(list(product((0.02, 0.1, 0.3, 1.0), (0.2, 0.5, 0.8))))
-    every = [curve for curve in equation.curves(rates, 20.0, 0.0) if curve]
-    curves = every[1::3]
-    apart = np.hypot(*(film.values[1] - film.values[0]).T)
-    length = float(np.nanmedian(apart))
+    pairs = np.array(list(product((0.02, 0.1, 0.3, 1.0), (0.2, 0.5, 0.8))))
+    every = [curve for curve in equation.curves(pairs, 20.0, 0.0) if curve]
+    length = float(np.nanmedian(np.hypot(*(film.values[1] - film.values[0]).T)))
     angle, times = theta[known], t[known]
-    first = known if held.release is None else known[times >= held.release - 1e-9]
-    found: list[tuple[float, Curve, float, FloatArray]] = []
-    for k in first[:: max(1, len(first) // 80)]:
-        after = times >= t[k] - 1e-9
-        for omega in _rates(times[after], angle[after], max(4, int(0.03 / step))):
-            for curve in curves:
-                f = curve.at(abs(omega) * (times[after] - t[k]), 1.0, 0.0)[0]
-                off = angle[after] - np.sign(omega) * f
-                start = np.angle(np.median(np.exp(1j * off[:5]).real) + 1j * np.median(np.exp(1j * off[:5]).imag))
-                near = np.abs(np.angle(np.exp(1j * (off - start)))) < 0.3
-                stays = _run(near)
-                if stays >= 6 and abs(f[stays - 1]) > 0.5:
-                    end = times[after][stays - 1]
-                    found.append((float(near[:stays].sum()), curve, float(end), np.array([t[k], start, omega])))
-    found.sort(key=lambda one: -one[0])
-    most = found[0][0] if found else 0.0
+    first = np.arange(len(known)) if held.release is None else np.flatnonzero(times >= held.release - 1e-9)
+    first = first[:: max(1, len(first) // 80)]
+    rates = np.outer([_rate(times[k:], angle[k:], max(4, int(0.03 / step))) for k in first], FASTER)
+    found = turnings(angle, times, first, rates, np.array([curve.rows for curve in every]), STEP, 0.3)
     tried: list[tuple[float, Likelihood, FloatArray]] = []
-    for _, curve, end, spin in [one for one in found if one[0] > 0.4 * most][:: max(1, len(found) // 40)]:
-        x, noise = _placed(film, curve, spin, end, length)
-        likelihood = Likelihood(film, held, end if held.touch is None else held.touch, max(noise, 1e-5))
-        better = _better(likelihood, curve, x)
-        if better[2][8] < 0.0:  # what accelerates upwards is no flight
-            tried.append(better)
-    near = [one for one in tried if 0.75 * GRAVITY < math.hypot(one[2][7], one[2][8]) < GRAVITY / 0.75]
-    tried = near or tried  # a clock or a stick that is far off is found all the same
+    for k, (score, index, omega0, start, last) in zip(first, found, strict=True):
+        if score < 0.4 * found[:, 0].max() or not score:
+            continue
+        curve, end = every[int(index)], float(times[int(last)])
+        x, noise = _placed(film, curve, np.array([times[k], start, omega0]), end, length)
+        touch, noise = end if held.touch is None else held.touch, max(noise, 1e-5)
+        # A turning that is a little wrong bends the parabola: one fit begins with gravity held near the earth's.
+        earthly = Likelihood(film, held, touch, noise)
+        earthly.expected[8], earthly.stiffness[8] = -GRAVITY, 0.5**-2
+        fit = earthly.fitted(curve, x, 8)
+        settled = settle(earthly, curve, fit.x)
+        for when, speed, begin in ((settled.touch, settled.speed, fit.x), (touch, TOUCH[1], x)):
+            better = _better(Likelihood(film, held, when, noise, speed), curve, begin)
+            if better[2][8] < 0.0:  # what accelerates upwards is no flight
+                tried.append(better)
     # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
-    tried.sort(key=lambda one: one[0])
+    tried.sort(key=lambda one: one[0] + _off_gravity(one[2]))
     apart_by: list[tuple[float, Likelihood, FloatArray]] = []
     for one in tried:
-        if len(apart_by) < 4 and all(abs(one[2][0] - other[2][0]) > 0.04 for other in apart_by):
+        if len(apart_by) < 5 and all(
+            abs(one[2][0] - other[2][0]) > 0.04 or abs(one[1].touch - other[1].touch) > 0.08 for other in apart_by
+        ):
             apart_by.append(one)
     if not apart_by:
         raise NoFlightError(
@@ -438,6 +463,11 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
     return [(one[1], one[2]) for one in sorted(polished, key=lambda one: one[0])]
 
 
+def _off_gravity(x: FloatArray) -> float:
+    """Return the cost of a gravity unlike the earth's; at most 50, so that a clock or stick far off is found, too."""
+    return min(50.0, 0.5 * ((math.hypot(x[7], x[8]) / GRAVITY - 1.0) / 0.1) ** 2)
+
+
 def _better(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[float, Likelihood, FloatArray]:
     """Return cost, likelihood and parameters after some steps, the touch settled among them."""
     fit = likelihood.fitted(curve, x, 8)
@@ -446,22 +476,11 @@ def _better(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[float,
     return fit.cost, likelihood, fit.x
 
 
-def _rates(t: FloatArray, angle: FloatArray, window: int) -> list[float]:
-    """Return angular velocities with which a turning may begin, from the first frames [rad/s]."""
+def _rate(t: FloatArray, angle: FloatArray, window: int) -> float:
+    """Return the angular velocity in the first frames [rad/s]; 0 of too few."""
     head, times = np.unwrap(angle[: window + 1]), t[: window + 1]
     lag = max(1, len(head) // 2)
-    if len(head) <= lag:
-        return []
-    rate = float(np.median((head[lag:] - head[:-lag]) / (times[lag:] - times[:-lag])))
-    return [rate * factor for factor in (0.95, 1.1, 1.3)] if abs(rate) > 0.3 else []
-
-
-def _run(near: NDArray[np.bool_]) -> int:
-    """Return how many frames a turning stays, up to where three of four have left it."""
-    for k in range(len(near)):
-        if not near[k] and (~near[k : k + 4]).sum() >= min(3, len(near) - k):
-            return k
-    return len(near)
+    return float(np.median((head[lag:] - head[:-lag]) / (times[lag:] - times[:-lag]))) if len(head) > lag else 0.0
 
 
 def _placed(film: Film, curve: Curve, spin: FloatArray, end: float, length: float) -> tuple[FloatArray, float]:

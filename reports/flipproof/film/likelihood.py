@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.film.curves import Curve
+from flipproof.film.kernel.scoring import points, sums
 from slicemodel.trajectory import FloatArray
 
 GRAVITY: Final = 9.81
@@ -35,6 +36,9 @@ HAND: Final = (500.0, 1.5)
 
 PULL: Final = (60.0, 60.0, 300.0)
 """Standard deviations of a hand's accelerations less those of flight: of C_M [m/s^2], twice, and of theta [rad/s^2]."""
+
+TIGHT: Final = 1e-6
+"""Standard deviation of what is held."""
 
 TOUCH: Final = (1.0, 3.0, 10.0)
 """Velocities that a table may take [m/s]; the likeliest is used."""
@@ -143,8 +147,28 @@ class Likelihood:
         self.area, self.seen = film.area, film.clicked
         self.two = film.values.shape[2] == 2
         self.index = {name: k for k, name in enumerate(film.names)}
+        self.log_bad = float(np.log(BAD / self.area))
+        self.expected, self.stiffness = self._priors()
         fixed = [held.release is not None, self.two and held.tilt, self.two and held.scale]
         self.degrees = (13 if self.two else 3) - sum(fixed)
+
+    def _priors(self) -> tuple[FloatArray, FloatArray]:
+        """Return where priors expect the inner parameters, and their inverse variances (0: no prior); each (K,)."""
+        held, noise = self.held, self.noise if self.held.noise is None else self.held.noise
+        known = {"log_noise": (float(np.log(noise)), 3.0 if held.noise is None else TIGHT)}
+        if held.release is not None:
+            known["release"] = held.release, TIGHT
+        if self.two:
+            known["log_hand"] = float(np.log(HAND[0])), HAND[1]
+            known |= {name: (0.0, size) for name, size in zip(("pull_x", "pull_y", "twist"), PULL, strict=True)}
+            if held.tilt:
+                known["ax"] = 0.0, TIGHT
+        elif self.film.quantity == "omega":
+            known["theta0"] = 0.0, 1.0
+        expected, stiffness = np.zeros(len(self.index)), np.zeros(len(self.index))
+        for name, (value, deviation) in known.items():
+            expected[self.index[name]], stiffness[self.index[name]] = value, deviation**-2
+        return expected, stiffness
 
     # ------------------------------------------------------------------ the model
 
@@ -154,41 +178,21 @@ class Likelihood:
         theta0, omega0 = x[1], x[2]
         tau = film.t - x[0]
         tilt = np.arctan2(x[n["ax"]], -x[n["ay"]]) if self.two else 0.0
-        f, w, r, dr, f_omega, r_omega, f_theta, r_theta = curve.at(abs(omega0) * tau, omega0, theta0 - tilt)
+        turning = curve.at(abs(omega0) * tau, omega0, theta0 - tilt)
+        if self.two:
+            values, slopes = points(turning, film.t, x)
+            return values, slopes
+        f, w, _, _, f_omega, _, f_theta, _ = turning
         sign = np.sign(omega0)
         theta, omega = theta0 + sign * f, omega0 * w
-        # Slopes of theta and R by release, theta_0 and omega_0.
-        turn = np.array([-omega, 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0])
-        slide = np.array([-abs(omega0) * dr, r_theta, sign * dr * tau + r_omega / omega0])
-        if not self.two:
-            slopes = np.zeros((1, len(tau), 1, len(n)))
-            if film.quantity == "theta":
-                slopes[0, :, 0, :3] = turn.T
-                return theta[None, :, None], slopes
-            bend = np.gradient(omega, film.t) if len(tau) > 1 else np.zeros_like(omega)
-            slopes[0, :, 0, 0], slopes[0, :, 0, 2] = -bend, w + bend * tau / omega0
-            return omega[None, :, None], slopes
-        held = 0.5 * np.minimum(tau, 0.0) ** 2
-        change = np.minimum(tau, 0.0)
-        theta = theta + x[12] * held
-        turn[0] -= x[12] * change
-        u = np.column_stack((np.sin(theta), -np.cos(theta)))
-        across = np.column_stack((np.cos(theta), np.sin(theta)))
-        p, v, a, length = x[3:5], x[5:7], x[7:9], x[9]
-        centre = p + np.outer(tau, v) + 0.5 * np.outer(tau**2, a) + np.outer(held, x[10:12])
-        values = np.array([centre - (length * r)[:, None] * u, centre + (length * (1 - r))[:, None] * u])
-        slopes = np.zeros((2, len(tau), 2, len(n)))
-        for body, along in enumerate((-r, 1 - r)):
-            slope = slopes[body]
-            for k in range(3):
-                slope[:, :, k] = length * ((along * turn[k])[:, None] * across - slide[k][:, None] * u)
-            slope[:, :, 0] -= v + np.outer(tau, a) + np.outer(change, x[10:12])
-            for d in range(2):
-                slope[:, d, 3 + d], slope[:, d, 5 + d], slope[:, d, 7 + d] = 1.0, tau, 0.5 * tau**2
-                slope[:, d, 10 + d] = held
-            slope[:, :, 9] = along[:, None] * u
-            slope[:, :, 12] = length * (along * held)[:, None] * across
-        return values, slopes
+        slopes = np.zeros((1, len(tau), 1, len(n)))
+        if film.quantity == "theta":
+            turn = np.array([-omega, 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0])
+            slopes[0, :, 0, :3] = turn.T
+            return theta[None, :, None], slopes
+        bend = np.gradient(omega, film.t) if len(tau) > 1 else np.zeros_like(omega)
+        slopes[0, :, 0, 0], slopes[0, :, 0, 2] = -bend, w + bend * tau / omega0
+        return omega[None, :, None], slopes
 
     def variance(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the variance of one coordinate (P,), and its slopes by the inner parameters (P, K)."""
@@ -229,7 +233,7 @@ class Likelihood:
         cost = np.zeros(len(times))
         for seen, one in zip(self.seen, (missed**2).sum(axis=2), strict=True):
             good = np.log1p(-BAD) - one / (2 * spread) - np.log(2 * np.pi * spread)
-            cost -= np.logaddexp(good, np.log(BAD / self.area))[:, seen].sum(axis=1)
+            cost -= np.logaddexp(good, self.log_bad)[:, seen].sum(axis=1)
         return cost
 
     def _density(self, missed: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -237,61 +241,33 @@ class Likelihood:
         power = missed.shape[2] / 2
         q = (missed**2).sum(axis=2) / (2 * variance)
         good = np.log1p(-BAD) - q - power * np.log(2 * np.pi * variance)
-        bad = np.log(BAD / self.area)
-        both = np.logaddexp(good, bad)
+        both = np.logaddexp(good, self.log_bad)
         return np.where(self.seen, -both, 0.0), np.where(self.seen, np.exp(good - both), 0.0), missed
 
     def penalty(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return cost, gradient and curvature of priors: what is held, and weak ones that keep parameters in reach."""
-        n, held, count = self.index, self.held, len(x)
-        rows: list[tuple[float, FloatArray]] = []
-
-        def prior(name: str, value: float, deviation: float) -> None:
-            row = np.zeros(count)
-            row[n[name]] = 1.0 / deviation
-            rows.append(((x[n[name]] - value) / deviation, row))
-
-        tight = 1e-6
-        if held.release is not None:
-            prior("release", held.release, tight)
-        if held.noise is not None:
-            prior("log_noise", float(np.log(held.noise)), tight)
-        else:
-            prior("log_noise", float(np.log(self.noise)), 3.0)
-        if self.two:
-            prior("log_hand", float(np.log(HAND[0])), HAND[1])
-            for name, size in zip(("pull_x", "pull_y", "twist"), PULL, strict=True):
-                prior(name, 0.0, size)
-            if held.tilt:
-                prior("ax", 0.0, tight)
-            if held.scale:
-                a = x[7:9]
-                down = float(np.hypot(*a))
-                row = np.zeros(count)
-                row[7:9] = a / down / tight
-                rows.append(((down - GRAVITY) / tight, row))
-        elif self.film.quantity == "omega":
-            prior("theta0", 0.0, 1.0)
-        r, j = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
-        gradient = j.T @ r
+        away = x - self.expected
+        gradient = self.stiffness * away
+        cost, curvature = 0.5 * float(away @ gradient), np.diag(self.stiffness)
+        if self.two and self.held.scale:
+            down = float(np.hypot(x[7], x[8]))
+            row = x[7:9] / (down * TIGHT)
+            cost += 0.5 * ((down - GRAVITY) / TIGHT) ** 2
+            gradient[7:9] += (down - GRAVITY) / TIGHT * row
+            curvature[7:9, 7:9] += np.outer(row, row)
         # The integral over what else is fitted is the larger the larger the noise: the mode is that of the noise alone.
-        gradient[n["log_noise"]] -= self.degrees
-        return float(0.5 * r @ r - self.degrees * x[n["log_noise"]]), gradient, j.T @ j
+        at = self.index["log_noise"]
+        gradient[at] -= self.degrees
+        return cost - self.degrees * x[at], gradient, curvature
 
     def terms(self, curve: Curve, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return the cost, its gradient and Fisher's information."""
         values, slopes = self.model(curve, x)
         variance, dv = self.variance(x)
-        cost, good, missed = self._density(self.film.values - values, variance)
-        dlog = dv / variance[:, None]
-        power = missed.shape[2] / 2
-        q = (missed**2).sum(axis=2) / (2 * variance)
-        root = np.sqrt(good / variance)[:, :, None]
-        flat = (root[..., None] * slopes).reshape(-1, len(x))
-        gradient = (good * (power - q)).sum(axis=0) @ dlog - (root * missed).ravel() @ flat
-        loose = np.sqrt(power * good.sum(axis=0))[:, None] * dlog
+        missed = self.film.values - values
+        cost, gradient, information = sums(missed, self.seen, slopes, variance, dv, np.log1p(-BAD), self.log_bad)
         total, pull, stiff = self.penalty(x)
-        return float(cost.sum()) + total, gradient + pull, flat.T @ flat + loose.T @ loose + stiff
+        return cost + total, gradient + pull, information + stiff
 
     def fitted(self, curve: Curve, x: FloatArray, steps: int = 30) -> Fit:
         """Return the inner parameters of the least cost near ``x``, by scoring with Levenberg's damping."""

@@ -24,6 +24,8 @@ WEAK: Final = "weak"
 FAILED: Final = "failed"
 EXPECTED: Final = "expected failure"
 IDLE: Final = "not applicable"
+WAITING: Final = "waiting"
+"""Somebody is to write an answer first (``files.Folder``)."""
 
 CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
     {
@@ -34,11 +36,11 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
         "inputs": checks_basic.check_inputs,
         "refinement": checks_measured.check_refinement,
         "ice": checks_basic.check_ice,
+        "definitions": checks_basic.check_definitions,
+        "angular-momentum": checks_basic.check_momentum,
         "angle": checks_basic.check_angle,
         "times": checks_basic.check_times,
-        "definitions": checks_basic.check_definitions,
         "velocity": checks_basic.check_velocity,
-        "angular-momentum": checks_basic.check_momentum,
         "restitution": checks_measured.check_restitution,
         "equation": checks_basic.check_equation,
         "gravity": checks_basic.check_gravity,
@@ -102,11 +104,15 @@ class Certificate:
     @property
     def conclusion(self) -> str:
         """The last line: how many checks there were, what became of them, and of which throws that is true."""
-        counts = {v: [r for r in self.results if r.verdict == v] for v in (PASSED, WEAK, FAILED, EXPECTED)}
+        counts = {v: [r for r in self.results if r.verdict == v] for v in (PASSED, WEAK, FAILED, EXPECTED, WAITING)}
         parts = [f"{len(found)} {v}" for v, found in counts.items() if found or v in (PASSED, FAILED)]
-        idle = [f"{r.check}: {r.reason}" for r in self.results if r.verdict == IDLE]
+        idle: dict[str, list[str]] = {}
+        for result in self.results:
+            if result.verdict == IDLE:
+                idle.setdefault(result.reason, []).append(result.check)
         if idle:
-            parts.append(f"{len(idle)} not applicable ({'; '.join(idle)})")
+            reasons = "; ".join(f"{', '.join(checks)}: {reason}" for reason, checks in idle.items())
+            parts.append(f"{sum(map(len, idle.values()))} not applicable ({reasons})")
         asked = f"; asked were {domain_text(self.domain)}" if self.domain else ""
         return f"{len(self.results)} checks: {', '.join(parts)}{asked}"
 
@@ -206,10 +212,13 @@ def certify(
     for name in traits.expected_failures:
         if name not in CHECKS:
             raise ForeignError(unknown_name("expected_failures: check", name, CHECKS))
-    asked, results, names = _Asked(runner), [], tuple(checks)
+    asked, names = _Asked(runner), tuple(checks)
+    results: list[Result] = []
     made: dict[str, Check] = {**CHECKS, "elsewhere": partial(elsewhere.check_elsewhere, seed=seed)}
     for name in names:
-        results.append(_result(name, made[name], traits, asked))
+        result = _result(name, made[name], traits, asked)
+        same = next((one.check for one in results if result.found is None and one.reason == result.reason), "")
+        results.append(replace(result, reason=f"as in {same}") if same and result.verdict == FAILED else result)
         say(results[-1])
         if until_failed and results[-1].verdict == FAILED:
             return Certificate(traits=declared, results=tuple(results), domain=asked.domain)
@@ -226,7 +235,9 @@ def _result(name: str, check: Check, traits: Traits, asked: _Asked) -> Result:
     known = traits.expected_failures.get(name)
     try:
         found = drive(check(traits), asked.again if name in ("determinism", "inputs") else asked)
-    except (NotApplicableError, WaitingError) as why:
+    except WaitingError as why:
+        return result(verdict=WAITING, reason=str(why))
+    except NotApplicableError as why:
         return result(verdict=IDLE, reason=str(why))
     except ForeignError as error:
         words = f"{error}; known: {known}" if known else str(error)
@@ -241,7 +252,7 @@ def _result(name: str, check: Check, traits: Traits, asked: _Asked) -> Result:
 def _enough(results: Iterable[Result]) -> Result:
     """Return whether half of the checks could be made, and half of these were not expected to fail."""
     meant = [r for r in results if r.check != "published-vectors"]
-    made = [r for r in meant if r.verdict != IDLE]
+    made = [r for r in meant if r.verdict not in (IDLE, WAITING)]
     kept = [r for r in made if r.verdict != EXPECTED]
     words = f"{len(made)} of {len(meant)} checks could be made"
     if holds := 2 * len(made) >= len(meant) and 2 * len(kept) > len(made):
@@ -253,6 +264,8 @@ def _enough(results: Iterable[Result]) -> Result:
             "not enough to judge: declare equation, refined_by and order where there are any, and answer r and v, too"
         )
     title = "Half of the checks could be made, and are not expected to fail."
+    if waiting := sum(r.verdict == WAITING for r in meant):
+        return Result(check=ENOUGH, verdict=WAITING, title=title, reason=f"{waiting} of {len(meant)} checks wait")
     return Result(
         check=ENOUGH,
         verdict=PASSED if holds else FAILED,
@@ -264,13 +277,13 @@ def _enough(results: Iterable[Result]) -> Result:
 def findings_of(certificate: Certificate, id_: str = "certify-", title: str = "") -> tuple[Finding, ...]:
     """Return one finding a check, with ``id_`` and ``title`` before its own.
 
-    The value is 1 if it holds, 0 if not; expected failures and idle checks are observations.
+    The value is 1 if it holds, 0 if not; expected failures, waiting and idle checks are observations.
     """
     found = []
     for result in certificate.results:
         about = f"{id_}{result.check}", f"{title}{result.title.rstrip('.')}"
-        value = None if result.verdict == IDLE else float(result.verdict != FAILED)
-        if result.verdict in (IDLE, EXPECTED):
+        value = None if result.verdict in (IDLE, WAITING) else float(result.verdict != FAILED)
+        if result.verdict in (IDLE, WAITING, EXPECTED):
             found.append(observed(*about, value, note=result.words))
         else:
             found.append(regression(*about, value, "", (1.0, 1.0), result.words))

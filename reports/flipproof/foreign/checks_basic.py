@@ -10,9 +10,11 @@ import numpy as np
 
 from flipproof.foreign import elsewhere
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift, when
-from flipproof.foreign.contract import Ask, Traits
+from flipproof.foreign.contract import Answer, Ask, Traits
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
+from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass, moment_of_inertia
+from slicemodel.trajectory import FloatArray
 from slicemodel.vectors import Vector, load_all
 
 
@@ -49,12 +51,16 @@ def check_start(traits: Traits) -> Making:
             break
     late = (answer.theta[0] - throw.theta0) / throw.omega0
     drifted = worst == "theta" and bound < late < 0.02  # a step or two; answers may belong to other times
+    sloped = worst == "omega" and bound < off[worst] < 0.05
+    shared = worst == "r" and answer.r is not None and float(np.max(np.ptp(answer.r, axis=0))) == 0.0
     return Found(
         holds=off[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
         came=f"{worst} off by {off[worst]:.2g}" + (f", as if it were {late:.2g} s later" if drifted else ""),
         where=f"t = 0 s, theta_0 = {throw.theta0:.3g} rad, omega_0 = {throw.omega0:g} rad/s",
         advice=("answer at ask.times themselves; " if drifted else "")
+        + ("omega is that of the instant, not a slope of theta between two times; " if sloped else "")
+        + ("r is the same at all times: keep a copy of the slices' places for each; " if shared else "")
         + "begin at scenario.theta0, scenario.omega0 and ask.start, with all slices at rest",
     )
 
@@ -64,8 +70,12 @@ def check_determinism(traits: Traits) -> Making:
     ask, other = ask_of(traits, THROW), ask_of(traits, OTHER)
     # Ice of as many slices as were thrown before, and of another number: what is kept from the throw before shows.
     ice = [ask_of(traits, replace(THROW.with_slices(n), frozen=True)) for n in (THROW.n_slices, 8)]
-    first, _, second, *frozen = yield [ask, other, ask, *ice]
-    change = max(float(np.max(np.abs(getattr(first, f) - getattr(second, f)))) for f in ("theta", "omega"))
+    first, _, second, *frozen, last = yield [ask, other, ask, *ice, ask]
+    change = max(
+        float(np.max(np.abs(getattr(first, name) - getattr(again, name))))
+        for name in ("theta", "omega")
+        for again in (second, last)
+    )
     flows, stays = (float(np.ptp(answer.omega)) / abs(THROW.omega0) for answer in frozen)
     kept = flows > 0.01 > 100 * stays
     came = "the same numbers" if change == 0.0 else f"numbers that differ by {change:.2g}"
@@ -73,7 +83,7 @@ def check_determinism(traits: Traits) -> Making:
         holds=change == 0.0 and not kept,
         expected="the same numbers",
         came=f"ice of {THROW.n_slices} slices flows after such a throw, that of 8 does not" if kept else came,
-        where="one throw asked twice, others between",
+        where="one throw asked three times, others and ice between",
         advice="reset all state between asks, keep nothing under a part of the throw, and seed random numbers",
     )
 
@@ -174,12 +184,17 @@ def check_ice(traits: Traits) -> Making:
         bounds["theta"] = 1000 * traits.epsilon / 2
     expected = {"omega": "omega constant", "theta": "theta = theta_0 + omega_0 t", "r": "r constant"}
     worst = next((name for name in off if not off[name].max() <= bounds[name]), "omega")
+    turns = (answer.theta - THROW.theta0 - turned) / (2 * np.pi)
+    whole = np.rint(turns)
+    wrapped = worst == "theta" and bool(np.ptp(whole)) and float(np.max(np.abs(turns - whole))) <= bounds["theta"]
     return Found(
         holds=float(off[worst].max()) <= bounds[worst],
         expected=f"{expected[worst]} within {bounds[worst]:.1g}",
         came=f"{worst} off by {off[worst].max():.2g}",
         where=f"scenario.frozen = True, {when(ask.times, off[worst])}",
-        advice="hold every slice where it is when scenario.frozen is true, and let theta go on from theta_0",
+        advice="theta is off by whole turns: do not wrap it"
+        if wrapped
+        else "hold every slice where it is when scenario.frozen is true, and let theta go on from theta_0",
         facts={"drift": float(off["omega"].max())},
     )
 
@@ -198,6 +213,7 @@ def check_angle(traits: Traits) -> Making:
     # Of order 2 or more, omega has a kink at an impact and theta none: what falls with the step alone is lost time.
     enough = 8.0 if (traits.order or 0.0) >= 2.0 and sizes[-1] > bound else 3.0
     holds = sizes[0] <= bound or (_falls(sizes, enough) and sizes[-1] <= 100 * bound)
+    hint = "" if holds else _own_times(answers[0]) or _jump(asks[0].times, answers[0].omega / THROW.omega0)
     stops = holds and (slow > 100 * max(bound, sizes[0]) or late.theta[-1] == late.theta[-2])
     return Found(
         holds=holds and not stops,
@@ -206,10 +222,30 @@ def check_angle(traits: Traits) -> Making:
         where=f"flight of {SLOW.duration:g} s" if stops else when(asks[0].times, offs[0]),
         advice="fly to the last of ask.times, however late that is"
         if stops
-        else "theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a step "
-        "with an impact",
+        else f"{hint}theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a "
+        "step with an impact",
         facts={"angle": sizes},
     )
+
+
+def _own_times(answer: Answer) -> str:
+    """Return that an answer belongs to times of its own, where theta stands still or runs straight between them."""
+    if np.any(np.diff(answer.theta) == 0.0):
+        return "theta stands still between two of the times asked: answer at ask.times themselves; "
+    bends = np.abs(np.diff(answer.theta, 2)) > 1e-12 * np.max(np.abs(answer.theta))
+    if np.mean(bends) < 0.5 and np.ptp(answer.omega) > 0.01 * abs(THROW.omega0):
+        return "theta runs straight from time to time of its own: go to ask.times themselves instead of interpolating; "
+    return ""
+
+
+def _jump(times: FloatArray, omega: FloatArray) -> str:
+    """Return where omega [omega_0] jumps, which it never does: the slices, and with them J, move continuously."""
+    steps = np.abs(np.diff(omega))
+    k = int(np.argmax(steps))
+    if steps[k] < max(0.01, 10 * np.quantile(steps, 0.98)):
+        return ""
+    where = f"omega jumps by {steps[k]:.2g} of omega_0 at t = {times[k]:.3g} s"
+    return f"{where}: look at where an impact or the end of a rest puts a slice; "
 
 
 SLOW: Final = replace(THROW, omega0=THROW.omega0 / 8, duration=8 * THROW.duration)
@@ -270,22 +306,43 @@ def check_momentum(traits: Traits) -> Making:
     answers = yield asks
     if answers[0].inertia is None:
         raise NotApplicableError("neither r nor inertia is given")
-    start = float(moment_of_inertia(THROW, asks[0].start)) * THROW.omega0
-    inertias = [a.inertia if a.r is None else moment_of_inertia(THROW, a.r) for a in answers]
-    changes = [np.abs(j * a.omega / start - 1.0) for j, a in zip(inertias, answers, strict=True) if j is not None]
+    changes = [_drift(ask, answer) for ask, answer in zip(asks, answers, strict=True)]
     sizes = [float(change.max()) for change in changes]
     bound = max(1e-6, 64 * traits.epsilon)  # as well as an engine conserves it
     falls = _falls(sizes)
+    holds, advice = sizes[0] <= LOCATED * bound or falls, ""
+    if not holds:
+        simpler = [ask_of(traits, throw) for throw in SIMPLER.values()]
+        drifts = [float(_drift(*one).max()) for one in zip(simpler, (yield simpler), strict=True)]
+        advice = _right_without(drifts, max(bound, 0.03 * sizes[0]))
     return Found(
-        holds=sizes[0] <= LOCATED * bound or falls,
+        holds=holds,
         weak=f"J omega is kept to {sizes[0]:.1g} only, whatever the step" if sizes[0] > bound and not falls else "",
         expected=f"J omega constant within {bound:.1g}, or a change that falls with refinement",
         came=f"changed by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
         where=when(asks[0].times, changes[0]),
-        advice="no torque acts about the centre of mass: omega = J_0 omega_0 / J, with J of the same instant, about "
-        "the centre of mass, of slices and bottle",
+        advice=f"{advice}no torque acts about the centre of mass: omega = J_0 omega_0 / J, with J of the same instant, "
+        "about the centre of mass, of slices and bottle",
         facts={"momentum": sizes},
     )
+
+
+def _drift(ask: Ask, answer: Answer) -> FloatArray:
+    """Return by how much J omega differs from its value at release, a fraction of it, at the times of an answer."""
+    throw = ask.scenario
+    inertia = answer.inertia if answer.r is None else moment_of_inertia(throw, answer.r)
+    assert inertia is not None
+    return np.asarray(np.abs(inertia * answer.omega / (moment_of_inertia(throw, ask.start) * throw.omega0) - 1.0))
+
+
+SIMPLER: Final = {"weight": replace(THROW, gravity=0.0), "drag": replace(THROW, drag=0.0), "impacts": SMOOTH}
+"""The throw of most checks without one of what acts in it."""
+
+
+def _right_without(sizes: Sequence[float], most: float) -> str:
+    """Return without what a difference is no larger than ``most``, and what to look at; ``sizes`` as in ``SIMPLER``."""
+    right = [name for name, size in zip(SIMPLER, sizes, strict=True) if size <= most]
+    return elsewhere.RIGHT_WITHOUT[right[0]] if right else ""
 
 
 def _refined(traits: Traits, points: int = 61) -> list[Ask]:
@@ -304,17 +361,32 @@ def _at_a_quarter(sizes: Sequence[float], unit: str = "") -> str:
 
 def check_mirror(traits: Traits) -> Making:
     """A throw mirrored left to right has the mirrored flight: -theta, -omega, the same r."""
-    mirrored = replace(THROW, theta0=-THROW.theta0, omega0=-THROW.omega0)
-    one, other = yield [ask_of(traits, THROW), ask_of(traits, mirrored)]
-    change = np.abs(one.omega + other.omega) / abs(THROW.omega0)
+    one, other = yield _mirrored(traits, THROW)
+    change = _unlike(one, other)
     bound = max(1e-9, 1024 * traits.epsilon)  # the launch is not mirrored, and round-off grows with every impact
+    holds, advice = float(change.max()) <= bound, ""
+    if not holds:
+        answers = yield [ask for throw in SIMPLER.values() for ask in _mirrored(traits, throw)]
+        sizes = [float(_unlike(*pair).max()) for pair in zip(answers[::2], answers[1::2], strict=True)]
+        advice = _right_without(sizes, bound)
     return Found(
-        holds=float(change.max()) <= bound,
+        holds=holds,
         expected=f"omega -> -omega within {bound:.1g} of omega_0",
         came=f"off by {change.max():.2g}",
         where=when(one.t, change),
-        advice="look for abs(omega), a sign of theta, or a place that assumes omega > 0",
+        advice=f"{advice}look for abs(omega), a sign of theta, another angle than theta in the weight, or a place that "
+        "assumes omega > 0",
     )
+
+
+def _mirrored(traits: Traits, throw: Scenario) -> list[Ask]:
+    """Return the ask for a throw and that for its mirror image."""
+    return [ask_of(traits, one) for one in (throw, replace(throw, theta0=-throw.theta0, omega0=-throw.omega0))]
+
+
+def _unlike(one: Answer, other: Answer) -> FloatArray:
+    """Return how far omega is from that of the mirror image, fraction of omega_0."""
+    return np.asarray(np.abs(one.omega + other.omega) / abs(THROW.omega0))
 
 
 def check_moving_frame(traits: Traits) -> Making:
@@ -354,7 +426,7 @@ def check_gravity(traits: Traits) -> Making:
     return Found(
         holds=float(off.max()) <= room,
         expected=f"omega changes by {np.abs(expected).max():.2g} of omega_0 at most, as in {traits.equation}",
-        came=f"by {np.abs(measured).max():.2g}, and differently by {off.max():.2g} (room {room:.1g})",
+        came=f"by {np.abs(measured).max():.2g} at most, {off.max():.2g} off at one time (room {room:.1g})",
         where=f"g = {light.gravity:g} against 0 m/s^2, {when(one.t, off)}",
         advice="the weight term is proportional to the throw's gravity: look for a constant or a switch",
         facts={"gravity": float(np.abs(measured).max())},

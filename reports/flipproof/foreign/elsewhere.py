@@ -571,6 +571,14 @@ def on_the_paper(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequ
     return _wrong_words(judged) if "omega" in judged.wrong else ""
 
 
+RIGHT_WITHOUT: Final[Mapping[str, str]] = {
+    "weight": "right without weight: look at the weight term, g cos(theta) along the bottle; ",
+    "drag": "right without drag: look at the drag, alpha v / m, and against what v is measured; ",
+    "impacts": "right before the first impact: look at impacts (restitution, recoil, their places) and rests; ",
+}
+"""What to look at if an answer is right without weight, drag or impacts, in the order in which this is asked."""
+
+
 def simplified(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequence[Answer], str]:
     """Return without what a throw is right, if anything tells: weight, drag, impacts; and what to look at then."""
     simpler = {
@@ -585,12 +593,9 @@ def simplified(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequen
     right = {name for name, judged in zip(simpler, others, strict=True) if not judged.wrong}
     if {"weight", "impacts"} <= right:
         return "right without weight, and without impacts: look at when slices rest on an end and weight lifts them; "
-    if "weight" in right:
-        return "right without weight: look at the weight term, g cos(theta) along the bottle; "
-    if "drag" in right:
-        return "right without drag: look at the drag, alpha v / m, and against what v is measured; "
-    if "impacts" in right:
-        return "right before the first impact: look at impacts (restitution, recoil, their places) and rests; "
+    for name, advice in RIGHT_WITHOUT.items():
+        if name in right:
+            return advice
     if "all" in right:
         return "right without weight, drag and impacts, and wrong without any single one of them; "
     return (
@@ -614,10 +619,11 @@ def _wrong_words(judged: Judged) -> str:
 
 
 def _impact_advice(judged: Judged) -> str:
-    """Return that impacts come first, where an answer is right through some of them and wrong later."""
+    """Return that impacts come first, where omega is right through some of them and wrong later."""
+    late = judged.passed and "omega" in judged.wrong
     return (
-        "right through some impacts: look at impacts first, their order and number, and rests; "
-        if judged.passed
+        "right through some impacts: look first at impacts, their order and number, and at rests and their ends; "
+        if late
         else ""
     )
 

@@ -15,6 +15,7 @@ import contextlib
 import errno
 import itertools
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -141,6 +142,7 @@ def half_of_memory() -> float:
 
 
 def last_line(printed: bytes) -> str:
-    """Return the last line that says something."""
-    said = [line for line in printed.decode(errors="replace").splitlines() if line.strip()]
-    return " ".join(said[-1].split()) if said else ""
+    """Return the last line that names an error, or else the last that says something."""
+    lines = [line for line in printed.decode(errors="replace").splitlines() if line.strip()]
+    errors = [line for line in lines if re.match(r"\s*[\w.]*(Error|Exception)\b.*:", line)]
+    return " ".join((errors or lines)[-1].split()) if lines else ""

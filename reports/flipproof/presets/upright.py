@@ -17,12 +17,10 @@ from typing import Any, Final
 
 from flipproof.chapters.landing.figures import figures, map_csv, share_line, shares_csv
 from flipproof.chapters.landing.study import Cases, Rows, Size, aiming, counting, read
-from flipproof.landing.design import Throws
-from flipproof.landing.work import Landed
+from flipproof.chapters.landing.throws import Throws
+from flipproof.chapters.landing.work import Landed
 from flipproof.output.files import write_whole
-from flipproof.output.folder import MARKER, OutputError, check_own, marker_text
-from flipproof.sweep.command import Begin, completed
-from flipproof.sweep.errors import SweepError
+from flipproof.sweep.command import Begin, completed, own_folder
 from flipproof.sweep.loop import rows_of
 from slicemodel import Scenario
 
@@ -51,7 +49,7 @@ def make_upright(
     SweepError
         If the folder, the workers or the disk will not do; what was stored is kept.
     """
-    _own(out)
+    own_folder(out, "landing")
     told = []
 
     def make(wave: str, cases: Cases) -> Rows:
@@ -77,19 +75,3 @@ def make_upright(
         write_whole(out / f"{exhibit.name}.png", drawing.png)
     lines = [share_line(results, family) for family in size.families]
     return "\n".join([*lines, f"({results.assumed})", *told, f"Tables and figures: {out}"])
-
-
-def _own(out: Path) -> None:
-    """Make the folder, or refuse one that holds anything but this study."""
-    kind = "landing"
-    try:
-        if out.exists() and not out.is_dir():
-            raise SweepError(f"{out} is a file; --out names a folder")
-        out.mkdir(parents=True, exist_ok=True)
-        check_own(out, kind)
-        if not (out / MARKER).exists():
-            write_whole(out / MARKER, marker_text(kind).encode())
-    except OutputError as error:
-        raise SweepError(str(error)) from None
-    except OSError as error:
-        raise SweepError(f"{out} cannot be written ({error.strerror or error})") from None

@@ -96,23 +96,30 @@ def completed(
 @contextmanager
 def _opened(out: Path, say: Callable[[str], object]) -> Iterator[Store]:
     """Make or check the folder and give its store; say what of it was made by other code or other versions."""
+    own_folder(out, KIND)
     try:
-        if out.exists() and not out.is_dir():
-            raise SweepError(f"{out} is a file; --out names a folder")
-        out.mkdir(parents=True, exist_ok=True)
-        parts = (entry.name for entry in out.iterdir() if entry.name.endswith(TEMPORARY))
-        check_own(out, KIND, ignored=tuple(parts))
-        if not (out / MARKER).exists():
-            write_whole(out / MARKER, marker_text(KIND).encode())
         store = Store(out / FILE, say=say)
-    except OutputError as error:
-        raise SweepError(str(error)) from None
     except (OSError, sqlite3.Error) as error:
         words = getattr(error, "strerror", None) or str(error)
         raise SweepError(f"{out / FILE} cannot be used ({words}); it is as it was") from None
     with store:
         _say_what_differs(store, say)
         yield store
+
+
+def own_folder(out: Path, kind: str) -> None:
+    """Make a folder and mark it as one of this ``kind``, or refuse, by a SweepError, one that holds anything else."""
+    try:
+        if out.exists() and not out.is_dir():
+            raise SweepError(f"{out} is a file; --out names a folder")
+        out.mkdir(parents=True, exist_ok=True)
+        check_own(out, kind, ignored=[entry.name for entry in out.iterdir() if entry.name.endswith(TEMPORARY)])
+        if not (out / MARKER).exists():
+            write_whole(out / MARKER, marker_text(kind).encode())
+    except OutputError as error:
+        raise SweepError(str(error)) from None
+    except OSError as error:
+        raise SweepError(f"{out} cannot be written ({error.strerror or error})") from None
 
 
 def _say_what_differs(store: Store, say: Callable[[str], object]) -> None:

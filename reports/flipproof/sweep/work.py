@@ -1,8 +1,8 @@
 """A point of a sweep: what is asked, the key of its row, and how a worker makes some of them together.
 
 A point names its maker, a function "module:name" that returns rows. Flights are made here; a landing's maker is
-``flipproof.landing.work``. Nothing here knows which machine it runs on: a row depends on nothing but its own point, so
-that chunks, workers and resuming cannot change a bit of it.
+``flipproof.chapters.landing.work``. Nothing here knows which machine it runs on: a row depends on nothing but its own
+point, so that chunks, workers and resuming cannot change a bit of it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from flipproof.foreign.specs import content_of
 from flipproof.frame.keys import changed_since_import, fingerprint, versions_of
-from flipproof.frame.solvers import Run, find, solve
+from flipproof.frame.solvers import find, solve
 from flipproof.frame.store import json_of
 from flipproof.output.provenance import provenance, version_of
 from flipproof.sweep.errors import SweepError
@@ -55,7 +55,7 @@ SOURCES: Final = (
     "engine_check",
     "flipproof.frame.solvers",
     "flipproof.sweep.work",
-    "flipproof.landing.work",
+    "flipproof.chapters.landing.work",
 )
 """What a row's numbers depend on."""
 
@@ -103,11 +103,6 @@ class Made(NamedTuple):
     versions: Mapping[str, str]
     rows: Sequence[Row]
     changed: str = ""
-
-
-def point_of(run: Run, **options: Any) -> Point:
-    """Return the point that makes a run of a study; ``options`` are those of ``make_flights``."""
-    return Point(run.solver, run.scenario.to_mapping(), run.settings, options=options)
 
 
 def kind_of(point: Point) -> str:

@@ -539,7 +539,7 @@ def test_there_are_at_least_120_mistakes_and_each_says_what_it_is():
 
 ASKED_FIRST = {
     "ThetaFromZero": "start",
-    "OmegaLate": "angle",
+    "OmegaLate": "angular-momentum",
     "CentreFromMiddle": "definitions",
     "FourDigits": "digits",
     "EffortFloor": "refinement",
@@ -565,10 +565,17 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("answers_cached_without_start", "inputs", "keep no answer under a part of the question"),
         ("restitution_hardcoded", "inputs", "with another restitution"),
         ("tolerance_of_the_module", "refinement", "or declare no refined_by"),
+        ("adaptive_cap_rebound_put_on_base", "angle", "look at where an impact or the end of a rest puts a slice"),
+        ("adaptive_leaves_off_just_before_answer", "angle", "theta stands still between two of the times asked"),
+        ("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating"),
+        ("fixed_omega_from_differences", "start", "not a slope of theta"),
+        ("halving_drag_of_momentum", "angular-momentum", "right without drag: look at the drag"),
+        ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
+        ("halving_released_level", "mirror", "right without weight: look at the weight"),
     ],
 )
 def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    solver = (patches("first") | patches("second"))[mistake].solver()
+    solver = (patches("first") | patches("second") | patches("fifth"))[mistake].solver()
     found = certify(InProcess(solver, mistake), until_failed=True)
     assert [r.check for r in found.failed] == [check]
     assert advice in found.results[-1].line

@@ -184,7 +184,9 @@ def _runs(number):
 def test_certify_finishes_and_names_each(runner, name):
     found = certify(runner(name), ["shape", "ice", "mirror"])
     assert [result.verdict for result in found.results] == [FAILED] * 3
-    assert all(re.search(WRONG[name], result.reason) for result in found.results)
+    first, *others = found.results
+    assert re.search(WRONG[name], first.reason)
+    assert all(result.reason == "as in shape" or re.search(WRONG[name], result.reason) for result in others)
     assert "3 checks: 0 passed, 3 failed" in found.conclusion
 
 

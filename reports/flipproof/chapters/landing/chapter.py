@@ -21,11 +21,11 @@ from flipproof.chapters.landing.study import (
     counting,
     read,
 )
+from flipproof.chapters.landing.throws import Case, make_cases
+from flipproof.chapters.landing.work import Landed
 from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
 from flipproof.frame.findings import Band, Finding, observed, regression
 from flipproof.frame.solvers import REFERENCE
-from flipproof.landing.design import Case, make_cases
-from flipproof.landing.work import Landed
 
 
 def study(ask: Ask) -> Study[LandingStudy]:

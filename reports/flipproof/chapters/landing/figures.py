@@ -16,9 +16,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Kind, LandingStudy
+from flipproof.chapters.landing.throws import FAMILIES
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.exhibit import Exhibit
-from flipproof.landing.design import FAMILIES
 from flipproof.output.columns import rows_csv
 
 LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {

@@ -16,10 +16,10 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.landing.design import SPARE, Aim, Case, Scatter, Share, Throws, Z, aimed, correlation
-from flipproof.landing.work import Landed
+from flipproof.chapters.landing.throws import SPARE, Aim, Case, Scatter, Share, Throws, Z, aimed, correlation
+from flipproof.chapters.landing.work import Landed
 from ode_reference import fly
-from ode_reference.landing import path
+from ode_reference.landing.land import path
 from slicemodel import Scenario, Table
 from slicemodel.observables import centre_of_mass_at_rest
 from slicemodel.trajectory import FloatArray

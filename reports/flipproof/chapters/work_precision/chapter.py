@@ -3,47 +3,45 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any, Final, NamedTuple
 
-from flipproof.chapters.work_precision.contenders import CASE, FULL
+from flipproof.chapters.work_precision.contenders import FULL, THROW, common_times, plan_work_precision
 from flipproof.chapters.work_precision.figure import figure_work_precision
-from flipproof.chapters.work_precision.study import (
-    Cost,
-    Curve,
-    Price,
-    WorkPrecision,
-    plan_work_precision,
-    study_work_precision,
-)
+from flipproof.chapters.work_precision.study import Cost, Curve, Price, WorkPrecision, study_work_precision
 from flipproof.frame.chapter import Ask, Band, Call, Chapter, Exhibit, Finding, Study, observed
 from flipproof.frame.findings import finite_or_none
 from flipproof.frame.timing import batches, make_timed
 from flipproof.output.columns import rows_csv
 from slicemodel.scenario import shortened
 
+NAME: Final = "impacts"
+TITLE: Final = "the paper's throw, with all its impacts"
+
 
 def study(ask: Ask) -> Study[WorkPrecision]:
     """Have workers time the runs of the effort ``ask.work``, those of one solver together."""
-    jobs = batches([(run, CASE.times) for run in plan_work_precision(CASE, ask.work)])
+    plan = plan_work_precision(THROW, ask.work)
+    jobs = batches([(run, common_times(THROW)) for run in plan.runs()])
     calls = [Call(make_timed, (job,), f"work, {job[0][0].solver}", timed=True) for job in jobs]
     # After the other runs, so that the compiled loop is there and its compiling is not counted.
     yield ()
     flights = yield calls
-    made = {each.run: each for call in calls for each in flights.answer(call)}
-    return study_work_precision(CASE, ask.work, made)
+    return study_work_precision(plan, {made.run: made for call in calls for made in flights.answer(call)})
 
 
 def claims(study: WorkPrecision) -> Iterator[Finding]:
     """Yield the order in cost of midpoint, prices side by side, the floors and what failed."""
-    curve = study.curves["midpoint on eq8"]
-    title = f"observed order in cost of midpoint, {study.case.title}"
+    slope = study.curves["midpoint on eq8"].slope
     words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
-    order = None if math.isnan(curve.slope) else curve.slope
-    note = curve.slope_reason or words
-    band = Band(curve.slope_error, "fit")
-    yield observed(f"work-order-midpoint-{study.case.name}", title, order, note=note, band=band)
+    yield observed(
+        f"work-order-midpoint-{NAME}",
+        f"observed order in cost of midpoint, {TITLE}",
+        finite_or_none(slope.order),
+        note=slope.reason or words,
+        band=Band(slope.error, "fit"),
+    )
     yield _pair(study, "exact-step on eq8", "midpoint on eq8")
     yield _pair(study, "pymunk on free-flight", "mujoco on free-flight")
     yield _cheapest(study, 1e-3)
@@ -131,14 +129,17 @@ def figures(study: WorkPrecision) -> Iterator[Exhibit]:
         return f"{curve.contender.key}: {' to '.join(words)}"
 
     levels = "; ".join(map(reached, study.curves.values()))
-    floors = ", ".join(f"{r.equation} {r.floor:.1e}" for r in study.references.values() if math.isfinite(r.floor))
+    references = study.references.items()
+    floors = ", ".join(f"{name} {each.floor:.1e}" for name, each in references if math.isfinite(each.floor))
     yield Exhibit(
-        name=f"work-precision-{study.case.name}",
-        title=f"What a digit costs: {study.case.title}",
-        caption="Farther left is cheaper, farther down is better; p is the order in cost. Each panel holds one "
-        "equation and those who solve it, so that what lies between equations does not enter. In the grey nothing is "
-        "claimed: there the reference itself is uncertain. A cross at the top edge is a run that failed; the table "
-        "says why. An update of one slice is counted the same on every machine, but is not the same work to everyone.",
+        name=f"work-precision-{NAME}",
+        title=f"What a digit costs: {TITLE}",
+        caption="Farther left is cheaper, farther down is better; p is the order in cost: the error halves p times as "
+        "work doubles. Each panel holds one equation and those who solve it, so that what lies between equations does "
+        "not enter. Solid: schemes, by their steps; dashed: methods, by their tolerance; dotted: engines, by their dt. "
+        "In the grey nothing is claimed: there the reference itself is uncertain; a hollow mark lies at that floor. "
+        "A cross at the top edge is a run that failed; the table says why. An update of one slice is counted the same "
+        "on every machine, but is not the same work to everyone.",
         alt="Log-log plots of error, of omega_0, against updates of one slice. "
         f"From the first level to the last: {levels}. Floors: {floors}.",
         maker=figure_work_precision,
@@ -152,12 +153,10 @@ def _levels_csv(study: WorkPrecision) -> str:
     return rows_csv(
         ("contender", "equation", "level", "updates of one slice [1]", "steps [1]", "processor time [s]",
          "error of omega [of omega_0]", "least error [of omega_0]", "largest error [of omega_0]",
-         "error of the plateau [of omega_0]", "floor of the reference [of omega_0]", "at the floor",
-         "failed because"),
+         "floor of the reference [of omega_0]", "at the floor", "failed because"),
         (
             (curve.contender.name, curve.contender.equation, point.settings, point.work, point.steps, point.seconds,
-             point.error, point.lowest, point.highest, point.plateau,
-             curve.reference.floor, point.at_floor, point.reason)
+             point.error, point.lowest, point.highest, curve.reference.floor, point.at_floor, point.reason)
             for curve in study.curves.values()
             for point in curve.points
         ),
@@ -167,65 +166,53 @@ def _levels_csv(study: WorkPrecision) -> str:
 class Table(NamedTuple):
     """A table of words: ``rows`` have as many cells as there are ``columns``."""
 
-    name: str
-    title: str
     columns: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-    note: str = ""
+    rows: list[tuple[str, ...]]
 
 
 def tabulate(study: WorkPrecision) -> Table:
     """Return what every contender reached and what an error costs it."""
     errors = (1e-2, 1e-3, 1e-4, 1e-6)
-
+    prices = tuple(f"updates for {error:.0e}" for error in errors)
+    columns = ("contender", "equation", "error, first to last level", "order in cost", *prices, "seconds for 1e-03")
     rows = []
     for curve in study.curves.values():
         who, whole, failed = (curve.contender.name, curve.contender.equation), curve.whole, curve.failed
         reached = f"{whole[0].error:.1e} to {whole[-1].error:.1e}" if whole else "–"
         reached += " (floor)" if any(point.at_floor for point in whole) else ""
-        flat = f"{whole[-1].plateau:.1e}" if whole else "–"
-        slope = f"{curve.slope:.2f} ± {curve.slope_error:.2f}"
-        order = slope if math.isfinite(curve.slope) else f"– ({curve.slope_reason})"
-        prices = [*(curve.price(error) for error in errors), curve.price(1e-3, "seconds")]
+        order = f"{curve.slope.order:.2f} ± {curve.slope.error:.2f}"
+        order = f"– ({curve.slope.reason})" if curve.slope.reason else order
+        costs = [*(curve.price(error) for error in errors), curve.price(1e-3, "seconds")]
         why = f"{len(failed)} of {len(curve.points)}: {failed[0].settings}: {failed[0].reason}" if failed else ""
-        rows.append((*who, reached, flat, order, *(price.text if price else "–" for price in prices), why))
-    return Table(
-        f"work-results-{study.case.name}",
-        f"What an error costs: {study.case.title}",
-        (
-            "contender", "equation", "error, first to last level", "of the plateau, last", "order in cost",
-            *(f"updates for {error:.0e}" for error in errors), "seconds for 1e-03", "failed",
-        ),
-        rows,
-        "Errors in fractions of omega_0; floor: not told apart from the reference. ≤: the coarsest level that was "
-        "usable keeps it already. Processor time is that of the machine that made this report.",
-    )  # fmt: skip
+        rows.append((*who, reached, order, *(cost.text if cost else "–" for cost in costs), why))
+    return Table((*columns, "failed"), rows)
 
 
 def summarise_work_precision(study: WorkPrecision) -> dict[str, Any]:
     """Return every number of the diagram as JSON-ready data; what is not finite becomes null."""
+    references = study.references.items()
     return {
-        study.case.name: {
-            "title": study.case.title,
-            "scenario": study.case.scenario.to_mapping(),
-            "references": {name: _plain(asdict(reference)) for name, reference in study.references.items()},
+        NAME: {
+            "title": TITLE,
+            "scenario": study.throw.to_mapping(),
+            "references": {
+                name: {"floor": finite_or_none(each.floor), "reason": each.reason} for name, each in references
+            },
             "contenders": {
                 key: {
                     **{name: getattr(curve.contender, name) for name in ("name", "family", "equation")},
-                    "held": _plain(curve.held),
-                    **_plain({name: getattr(curve, name) for name in ("slope", "slope_error", "slope_reason")}),
-                    "points": [_plain(asdict(point)) for point in curve.points],
+                    "slope": finite_or_none(curve.slope.order),
+                    "slope_error": finite_or_none(curve.slope.error),
+                    "slope_reason": curve.slope.reason,
+                    "points": [
+                        {name: finite_or_none(x) if isinstance(x, float) else x for name, x in asdict(point).items()}
+                        for point in curve.points
+                    ],
                 }
                 for key, curve in study.curves.items()
             },
         }
     }
-
-
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    finite = {name: finite_or_none(value) if isinstance(value, float) else value for name, value in values.items()}
-    known = (bool, int, float, str, type(None))
-    return {name: value if isinstance(value, known) else str(value) for name, value in finite.items()}
 
 
 CHAPTER: Final = Chapter(

@@ -19,8 +19,9 @@ engine has several members: their impacts fall at other phases of the step, and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -45,26 +46,18 @@ OWN_LIMIT: Final = "limit of "
 
 EQUATION_OF_SCHEME: Final[Mapping[str, str]] = {**LIMITS, "paper-typeset": AT_REST}
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Case:
-    """A throw on which all compete."""
-
-    name: str
-    title: str
-    scenario: Scenario
-
-    @property
-    def times(self) -> FloatArray:
-        """The common times, shape (COMMON + 1,) [s]."""
-        return np.linspace(0.0, self.scenario.duration, COMMON + 1)
-
+IMPLICIT_ON: Final = ("eq8", "free-flight")
+"""The equations that implicit methods are asked for: one without recoil and one with it."""
 
 # With 20 slices, ten times the rest speed moves free flight by 1.4e-3 omega_0 after 1251 impacts, and nothing finer
 # than that could be told apart; with 12 by 1e-5.
 THROW: Final = Scenario().with_slices(12)
-CASE: Final = Case(name="impacts", title="the paper's throw, with all its impacts", scenario=THROW)
-"""The throw of the report."""
+"""The paper's throw, as the report shows it."""
+
+
+def common_times(throw: Scenario) -> FloatArray:
+    """Return the times at which errors are read, shape (COMMON + 1,) [s]."""
+    return np.linspace(0.0, throw.duration, COMMON + 1)
 
 
 class Grids(NamedTuple):
@@ -73,36 +66,23 @@ class Grids(NamedTuple):
     levels: int
     members: tuple[int, ...]
 
-    def settings(self, of: Callable[[int], dict[str, Any]]) -> tuple[tuple[dict[str, Any], ...], ...]:
-        """Return the setting of every member of every level, from its number of steps, which doubles each time."""
-        return tuple(tuple(of(COMMON * member * 2**level) for member in self.members) for level in range(self.levels))
+    def steps(self) -> list[list[int]]:
+        """Return the number of steps of every member of every level; it doubles from one level to the next."""
+        return [[COMMON * member * 2**level for member in self.members] for level in range(self.levels)]
 
 
-class Asked(NamedTuple):
-    """The relative tolerances of a method, and the equations that it is asked for; none: all that have a contender."""
-
-    rtol: tuple[float, ...]
-    equations: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effort:
-    """How much is run: grids of schemes and engines, and what methods are asked."""
+class Effort(NamedTuple):
+    """How much is run: grids of schemes and engines, and the relative tolerances of methods."""
 
     schemes: Grids
     engines: Grids
-    methods: Mapping[str, Asked]
+    methods: Mapping[str, tuple[float, ...]]
 
 
 FULL: Final = Effort(
     schemes=Grids(7, (4, 5, 6)),
     engines=Grids(5, (4, 6)),
-    methods={
-        "DOP853": Asked((1e-3, 1e-6, 1e-9, 1e-11)),
-        # The implicit methods on an equation without recoil and on one with it.
-        "LSODA": Asked((1e-3, 1e-6, 1e-9, 1e-11), ("eq8", "free-flight")),
-        "Radau": Asked((1e-5, 1e-8), ("eq8", "free-flight")),
-    },
+    methods={"DOP853": (1e-3, 1e-6, 1e-9, 1e-11), "LSODA": (1e-3, 1e-6, 1e-9, 1e-11), "Radau": (1e-5, 1e-8)},
 )
 
 
@@ -114,94 +94,114 @@ class Contender:
     ----------
     name : str - as figures and tables print it
     family : {"scheme", "method", "engine"}
-    solver : str - whose ``solve`` is asked: scheme, model or engine
     equation : str - what it is held against: a model's name, AT_REST, or OWN_LIMIT and the scheme
-    fixed : mapping - settings of all its runs
-    levels : levels of members - the settings that are refined
+    levels : the runs of every level, the coarsest first
     """
 
     name: str
     family: Literal["scheme", "method", "engine"]
-    solver: str
     equation: str
-    fixed: Mapping[str, Any]
-    levels: tuple[tuple[Mapping[str, Any], ...], ...]
+    levels: tuple[tuple[Run, ...], ...]
 
     @property
     def key(self) -> str:
         """Unique among the contenders of a throw: a method competes once for each equation."""
         return f"{self.name} on {self.equation}"
 
-    def runs(self, case: Case) -> list[list[Run]]:
-        """Return the runs of every level."""
-        label = f"work, {case.name}, {self.key}"
-        return [
-            [
-                Run(self.solver, case.scenario, {**self.fixed, **settings}, f"{label}, {k}, {member}")
-                for member, settings in enumerate(level)
-            ]
-            for k, level in enumerate(self.levels)
-        ]
+
+class Plan(NamedTuple):
+    """All who compete on a throw, and the reference of every equation that somebody solves, its witnesses behind it."""
+
+    throw: Scenario
+    rivals: tuple[Contender, ...]
+    references: Mapping[str, tuple[Run, ...]]
+
+    def runs(self) -> list[Run]:
+        """Return every run."""
+        levels = (level for rival in self.rivals for level in rival.levels)
+        return list(chain.from_iterable((*self.references.values(), *levels)))
 
 
-def contenders(case: Case, effort: Effort) -> tuple[Contender, ...]:
-    """Return all who compete on a throw: schemes, engines, then methods for each equation that one of these solves."""
-    rivals = (*_schemes(effort), *_engines(case, effort))
+def plan_work_precision(throw: Scenario, effort: Effort) -> Plan:
+    """Plan schemes, engines, the methods for each equation that one of these solves, and all references."""
+    rivals = (*_schemes(throw, effort), *_engines(throw, effort))
     solved = {rival.equation for rival in rivals}
-    return (*rivals, *_methods(case, effort, [model for model in MODELS if model in solved]))
+    rivals += tuple(_methods(throw, effort, [model for model in MODELS if model in solved]))
+    first = {rival.equation: rival for rival in reversed(rivals)}
+    references = {
+        equation: _reference(throw, first[equation]) for equation in dict.fromkeys(r.equation for r in rivals)
+    }
+    return Plan(throw, rivals, references)
 
 
-def _schemes(effort: Effort) -> Iterator[Contender]:
+def _levels(throw: Scenario, solver: str, key: str, levels: Iterable[list[dict[str, Any]]]) -> tuple[Any, ...]:
+    """Return the runs of levels, each a list of its members' settings."""
+    return tuple(
+        tuple(Run(solver, throw, settings, f"work, {key}, {k}, {member}") for member, settings in enumerate(level))
+        for k, level in enumerate(levels)
+    )
+
+
+def _schemes(throw: Scenario, effort: Effort) -> Iterator[Contender]:
     for name, scheme in SCHEMES.items():
-        yield Contender(
-            name=name,
-            family="scheme",
-            solver=name,
-            equation=EQUATION_OF_SCHEME.get(name, OWN_LIMIT + name),
-            fixed={"store": "summary", "rebound": "in-step" if scheme.form.in_step else "grid"},
-            # Points of the grid: one more than steps.
-            levels=effort.schemes.settings(lambda steps: {"steps": steps + 1}),
-        )
+        equation = EQUATION_OF_SCHEME.get(name, OWN_LIMIT + name)
+        fixed = {"store": "summary", "rebound": "in-step" if scheme.form.in_step else "grid"}
+        # Points of the grid: one more than steps.
+        levels = [[{**fixed, "steps": steps + 1} for steps in level] for level in effort.schemes.steps()]
+        runs = _levels(throw, name, f"{name} on {equation}", levels)
+        yield Contender(name=name, family="scheme", equation=equation, levels=runs)
 
 
-def _engines(case: Case, effort: Effort) -> Iterator[Contender]:
+def _engines(throw: Scenario, effort: Effort) -> Iterator[Contender]:
     from engine_check.pymunk_settings import enough_iterations
 
-    duration = case.scenario.duration
     for engine in ENGINES.values():
         # Iterations by rule, where the engine iterates; they depend on the throw, not on dt.
-        iterated = {"iterations": enough_iterations(case.scenario)} if engine.sweeps else {}
-        yield Contender(
-            name=engine.name,
-            family="engine",
-            solver=engine.name,
-            equation=engine.model,
-            fixed={"times": case.times, **iterated},
-            levels=effort.engines.settings(lambda steps: {"dt": duration / steps}),
-        )
+        fixed = {"times": common_times(throw)} | ({"iterations": enough_iterations(throw)} if engine.sweeps else {})
+        levels = [[{**fixed, "dt": throw.duration / steps} for steps in level] for level in effort.engines.steps()]
+        runs = _levels(throw, engine.name, f"{engine.name} on {engine.model}", levels)
+        yield Contender(name=engine.name, family="engine", equation=engine.model, levels=runs)
 
 
-def _methods(case: Case, effort: Effort, solved: list[str]) -> Iterator[Contender]:
-    longest = case.scenario.duration
+def _methods(throw: Scenario, effort: Effort, solved: list[str]) -> Iterator[Contender]:
     # Radau's dense output has order 3: with steps as long as its tolerance allows, rests and releases chatter (627 402
     # right-hand sides at rtol 1e-4, where 10 071 suffice at 1e-8). 0.02 rad of the bottle at release are short enough.
-    shorter = min(0.02 / abs(case.scenario.omega0), longest)
+    longest = {"Radau": min(0.02 / abs(throw.omega0), throw.duration)}
     for model in solved:
-        for method, asked in effort.methods.items():
-            if asked.equations and model not in asked.equations:
+        for method, tolerances in effort.methods.items():
+            if method != "DOP853" and model not in IMPLICIT_ON:
                 continue
-            yield Contender(
-                name=method,
-                family="method",
-                solver=model,
-                equation=model,
-                fixed={
-                    "method": method,
-                    "max_step": shorter if method == "Radau" else longest,
-                    "rest_speed": usual_rest_speed(model),
-                    "impact_law": "simultaneous",
-                    "times": case.times,
-                },
-                # The numbers are of the order of 0.1 to 10.
-                levels=tuple(({"rtol": rtol, "atol": 1e-3 * rtol},) for rtol in asked.rtol),
-            )
+            fixed = {
+                "method": method,
+                "max_step": longest.get(method, throw.duration),
+                "rest_speed": usual_rest_speed(model),
+                "impact_law": "simultaneous",
+                "times": common_times(throw),
+            }
+            # The numbers are of the order of 0.1 to 10.
+            levels = [[{**fixed, "rtol": rtol, "atol": 1e-3 * rtol}] for rtol in tolerances]
+            runs = _levels(throw, model, f"{method} on {model}", levels)
+            yield Contender(name=method, family="method", equation=model, levels=runs)
+
+
+def _reference(throw: Scenario, rival: Contender) -> tuple[Run, ...]:
+    """Return the reference of a contender's equation and its witnesses."""
+    asked: list[dict[str, Any]]
+    if rival.equation in (*MODELS, AT_REST):
+        solver, throw = ("eq8", replace(throw, frozen=True)) if rival.equation == AT_REST else (rival.equation, throw)
+        usual, times = usual_rest_speed(solver), common_times(throw)
+        asked = [{"method": "taylor", "rest_speed": usual / 10, "times": times}]
+        for method, rtol, radians in (("LSODA", 1e-10, 0.02), ("DOP853", 1e-11, 0.04)):
+            longest = min(radians / abs(throw.omega0), throw.duration)
+            tolerances = {"rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": usual, "max_step": longest}
+            asked.append({"method": method, **tolerances, "times": times})
+    else:
+        # The scheme's own limit: the scheme on a grid eight times finer than its last level, and on half of that.
+        solver, settings = rival.levels[-1][0].solver, rival.levels[-1][0].settings
+        finest = 8 * (settings["steps"] - 1)
+        asked = [{**settings, "steps": finest // coarser + 1} for coarser in (1, 2)]
+    names = ("reference", "witness 1", "witness 2")
+    return tuple(
+        Run(solver, throw, settings, f"work, {name}, {rival.equation}")
+        for name, settings in zip(names, asked, strict=False)
+    )

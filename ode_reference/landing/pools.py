@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from ode_reference.landing_core.layout import MAX_POOLS
 from slicemodel.compiled import merged
 
 
@@ -21,7 +18,7 @@ def join(value, mass, blocks, total, weight, count):
 
 
 @merged
-def pool_chain(x, tube, closed, world, y, total, weight, count):
+def pool(x, tube, closed, world, y, total, weight, count):
     """Project ``x`` and ``tube`` on what the closed gaps of a chain allow; return the tube's value and its pool's mass.
 
     Bodies that touch one another make a run, along which values may not rise: slices resting on the cap, the tube and
@@ -71,35 +68,4 @@ def pool_chain(x, tube, closed, world, y, total, weight, count):
                         y[i] = value
                 k = end
         j += 1
-    return at, pooled
-
-
-@merged
-def pool_stops(x, tube, closed, world, y):
-    """Do the same where each slice has its own stops: it is pooled with the tube or with nothing."""
-    n = world.n
-    below, above = -np.inf, np.inf
-    at, pooled = tube, world.tube
-    for _ in range(MAX_POOLS):
-        mass, momentum = world.tube, world.tube * tube
-        for i in range(n):
-            if (closed[4 + i] and x[i] > at) or (closed[4 + n + i] and x[i] < at):
-                mass += world.m
-                momentum += world.m * x[i]
-        new = momentum / mass
-        pooled = mass
-        if new == at:
-            break
-        # The momentum balance is monotone in the tube's value: keep Newton's step inside what is known of its root.
-        if new > at:
-            below = at
-        else:
-            above = at
-        if not below <= new <= above:
-            new = (below + above) / 2
-        at = new
-    for i in range(n):
-        y[i] = x[i]
-        if (closed[4 + i] and x[i] > at) or (closed[4 + n + i] and x[i] < at):
-            y[i] = at
     return at, pooled

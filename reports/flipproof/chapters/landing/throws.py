@@ -20,7 +20,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.landing.work import MAKER, REFERENCE, Landed, make_landing
+from flipproof.chapters.landing.work import MAKER, REFERENCE, Landed, make_landing
 from flipproof.sweep.work import Point
 from ode_reference import turn
 from slicemodel import Scenario
@@ -241,15 +241,13 @@ def wilson(count: int, throws: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """Throws about one aim onto one table, landed by one program under one law.
+    """Throws about one aim onto one table, landed event by event under one law; None for ice.
 
-    Without ``law`` it is the program's own, or ice; ``program`` is "ode_reference" or an engine of
-    ``engine_check.land``. Seeds of different streams have no throw in common.
+    Seeds of different streams have no throw in common.
     """
 
     aim: Aim
     law: str | None
-    program: str = REFERENCE
     restitution: float = 0.3
     friction: float = 0.4
     scatter: Scatter = field(default_factory=Scatter)
@@ -288,7 +286,7 @@ class Throws:
         for case in self.cases:
             settings = case.settings()
             for place in range(case.throws):
-                yield Point(case.program, self.thrown(case, place).to_mapping(), settings, MAKER)
+                yield Point(REFERENCE, self.thrown(case, place).to_mapping(), settings, MAKER)
 
     def thrown(self, case: Case, place: int) -> Scenario:
         """Return the throw of a case at that place in [0, throws)."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ode_reference.landing_core.layout import CREEPING, MAX_POOLS, MAX_SWEEPS
-from ode_reference.landing_core.pools import pool_chain, pool_stops
+from ode_reference.landing.layout import CREEPING, MAX_POOLS, MAX_SWEEPS
+from ode_reference.landing.pools import pool
 from slicemodel.compiled import merged
 
 
@@ -53,10 +53,8 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
     for outer in range(MAX_POOLS):
         if world.rigid:
             at, pooled = tube + axial / m_all, m_all
-        elif world.chain:
-            at, pooled = pool_chain(x, tube + axial / world.tube, closed, world, y, work[0], work[1], work[2])
         else:
-            at, pooled = pool_stops(x, tube + axial / world.tube, closed, world, y)
+            at, pooled = pool(x, tube + axial / world.tube, closed, world, y, work[0], work[1], work[2])
         v_t = free[0] + (across * a22 - a12 * torque) / det
         omega = free[1] + (m_all * torque - a12 * across) / det
         if corners == 0 or (outer > 0 and abs(at - expected) <= 1e-12 * (1.0 + abs(at))):

@@ -1,7 +1,7 @@
 """The landing verb of this room: one touch and one table in, one certified outcome out.
 
-The motion is that of ``landing_core``: events located, impulses by Newton's law. Where the outcome is certified is
-decided by energy (``slicemodel.table.Outcome``), and whether by a second run with half the step.
+The motion is that of ``ode_reference.landing``: events located, impulses by Newton's law. Where the outcome is
+certified is decided by energy (``slicemodel.table.Outcome``), and whether by a second run with half the step.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -20,7 +19,7 @@ from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table,
 from slicemodel.trajectory import FloatArray
 
 if TYPE_CHECKING:
-    from ode_reference.landing_core.layout import Landing, World
+    from ode_reference.landing.layout import Landing, World
 
 DEFAULT_DT: Final = 4e-4
 """Longest step [s]; the numbers of an outcome are those of half of it."""
@@ -36,15 +35,6 @@ base or one that hangs an atom's width above it changes what comes after, and no
 REFINED: Final = (8, 64)
 SHORTEST: Final = 5e-6
 """How many times smaller the steps are that follow where one leaves the outcome open, and the shortest of them [s]."""
-
-SLICES: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "exclude": "slices are rods of length h/N that meet each other",
-        "staggered": "each slice has two stops of its own, where the stacks on base and cap would hold it",
-        "overlap": "refused: slices that overlap all sink to the base, and the centre of mass at rest is wrong",
-    }
-)
-"""How slices keep the room they need."""
 
 IMMOBILE: Final = 1e-12
 """Room in the bottle below which water cannot move [L]."""
@@ -82,11 +72,13 @@ def land(
     touch: Touch,
     table: Table,
     law: str | None = None,
-    slices: str = "exclude",
     *,
     dt: float = DEFAULT_DT,
 ) -> Outcome:
-    """Land a bottle on a table, impact by impact, until its outcome is certain (derived in ``landing_core``).
+    """Land a bottle on a table, impact by impact, until its outcome is certain (derived in ``ode_reference.landing``).
+
+    Slices are rods of length h/N that meet each other: slices that overlap would all sink to the base, and the centre
+    of mass at rest would be wrong.
 
     Parameters
     ----------
@@ -95,9 +87,6 @@ def land(
     law : str, optional
         "together" (the default) or "in-turn" (``slicemodel.table.LAWS``): who takes part in an impact on the table
         while water rests in the bottle. Ice has no law: there is nothing inside that could come after.
-    slices : str
-        "exclude", rods that meet each other, the reference; or "staggered", which gives each slice two stops of its
-        own and costs less. Without effect on ice.
     dt : float
         Longest step [s], in [1e-6, 1e-3].
 
@@ -113,7 +102,7 @@ def land(
     ------
     ValueError
         Naming the argument, its value and the admissible values: an unknown law, a law for ice, slices that overlap
-        here or that lie beyond their stops in the touch.
+        or lie beyond their room in the touch.
 
     Accuracy
     --------
@@ -123,7 +112,7 @@ def land(
     """
     chosen = _law(touch.scenario, law)
     dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
-    world = world_of(touch, table, chosen, slices)
+    world = world_of(touch, table, chosen)
     for step in (dt, *(dt / k for k in REFINED if dt / k >= SHORTEST)):
         # From the twins with the step, from the touch with half of it: what both leave open is refined.
         twins = zip(touch.twins(EDGE * step), TWINS_TOUCHING, strict=True)
@@ -132,7 +121,6 @@ def land(
             break
     settings = {
         "law": None if world.rigid else chosen,
-        "slices": None if world.rigid else slices,
         "dt": step / 2,
         "height": table.height,
         "restitution": table.restitution,
@@ -150,15 +138,10 @@ def _law(scenario: Scenario, law: str | None) -> str:
     return law
 
 
-def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
+def world_of(touch: Touch, table: Table, law: str) -> World:
     """Return the constants of a landing, or raise ValueError for slices that are not where they may be."""
-    from ode_reference.landing_core.layout import World
+    from ode_reference.landing.layout import World
 
-    if known_name("slices", slices, SLICES) == "overlap":
-        raise ValueError(
-            "slices = 'overlap' is refused: overlapping slices at rest all sink to the base, which puts the centre of "
-            "mass too low (admissible: 'exclude', 'staggered')"
-        )
     scenario = touch.scenario
     bottle, n, rod = scenario.bottle, scenario.n_slices, scenario.slice_height
     half = bottle.length / 2
@@ -169,7 +152,7 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
     low: FloatArray
     high, low = half - (i + 0.5) * rod, -half + (n - i - 0.5) * rod
     if not rigid:
-        _refuse_misplaced(touch, slices == "exclude", low + half, high + half)
+        _refuse_misplaced(touch, low + half, high + half)
     rest = bottle.mass * half + scenario.slice_mass * float((half - high).sum())
     rest /= scenario.total_mass
     saddle = scenario.total_mass * scenario.gravity * math.hypot(bottle.radius, rest)
@@ -177,7 +160,6 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
     upside_down = bottle.length - rest if scenario.frozen else rest
     return World(
         n=n,
-        chain=slices == "exclude",
         rigid=rigid,
         in_turn=law == "in-turn",
         half=half,
@@ -191,8 +173,6 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
         e_table=table.restitution,
         friction=table.friction,
         rod=rod,
-        low=low,
-        high=high,
         saddle=saddle,
         upright=math.atan2(bottle.radius, rest),
         cap=math.pi - math.atan2(bottle.radius, upside_down),
@@ -201,7 +181,7 @@ def world_of(touch: Touch, table: Table, law: str, slices: str) -> World:
     )
 
 
-def _refuse_misplaced(touch: Touch, chain: bool, low: FloatArray, high: FloatArray) -> None:
+def _refuse_misplaced(touch: Touch, low: FloatArray, high: FloatArray) -> None:
     """Raise ValueError if a slice lies where no slice that keeps its room can be."""
     length, rod, r = touch.scenario.bottle.length, touch.scenario.slice_height, touch.r
     beyond = MISPLACED * length
@@ -210,16 +190,15 @@ def _refuse_misplaced(touch: Touch, chain: bool, low: FloatArray, high: FloatArr
             f"touch.r[{k}] = {r[k]:.9g} m is outside [{low[k]:.9g}, {high[k]:.9g}] m, the room of slice {k} among "
             f"{len(r)} that do not overlap: take a flight in which they do not (model 'column', or rods)"
         )
-    near = np.flatnonzero(r[:-1] - r[1:] < rod - beyond) if chain else np.empty(0, dtype=np.int64)
-    for k in near[:1].tolist():
+    for k in np.flatnonzero(r[:-1] - r[1:] < rod - beyond)[:1].tolist():
         raise ValueError(
             f"touch.r[{k}] - touch.r[{k + 1}] = {r[k] - r[k + 1]:.9g} m is below the length {rod:.9g} m of a rod: take "
-            "a flight whose slices do not overlap, or slices = 'staggered'"
+            "a flight whose slices do not overlap"
         )
 
 
 def state_of(touch: Touch, world: World) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (q, s, w) of ``landing_core``: the lowest corner on the table, the tube's middle over x = 0."""
+    """Return (q, s, w) of ``ode_reference.landing``: the lowest corner on the table, the tube's middle over x = 0."""
     sine, cosine = math.sin(touch.theta), math.cos(touch.theta)
     height = world.half * abs(cosine) + world.radius * abs(sine)
     q = np.array([0.0, height, touch.theta, *touch.velocity, touch.omega])
@@ -227,7 +206,7 @@ def state_of(touch: Touch, world: World) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def _run(touch: Touch, world: World, dt: float) -> Landing:
-    from ode_reference.landing_core import loop
+    from ode_reference.landing import loop
 
     q, s, w = state_of(touch, world)
     none = np.empty((0, 7 + 2 * world.n))
@@ -239,7 +218,6 @@ def path(
     touch: Touch,
     table: Table,
     law: str | None = None,
-    slices: str = "exclude",
     *,
     dt: float = DEFAULT_DT,
     every: float = 1e-3,
@@ -251,10 +229,10 @@ def path(
     ``every`` is the time between two instants, at most ``dt`` late, ``duration`` the whole [s]; the touch may be lifted
     by ``drop`` [m] first.
     """
-    from ode_reference.landing_core import loop, motion
+    from ode_reference.landing import loop, motion
 
     # Without a saddle nothing ends the run before its time.
-    world = world_of(touch, table, _law(touch.scenario, law), slices)
+    world = world_of(touch, table, _law(touch.scenario, law))
     q, s, w = state_of(touch, world)
     q[1] += drop
     record = np.full((math.ceil(duration / every), 7 + 2 * world.n), np.nan)
@@ -277,7 +255,7 @@ def path(
 
 def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, object]) -> Outcome:
     """Return the outcome of a run and of its twins, which start from touches that differ by ``shift``."""
-    from ode_reference.landing_core.layout import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
+    from ode_reference.landing.layout import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
 
     names = {UPRIGHT: "upright", LYING: "lying", CAP: "cap"}
     run, *twins = runs

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from slicemodel.trajectory import FloatArray
-
 LOCATED = 1e-10
 """Gap at which the search for an impact ends [L]."""
 
@@ -27,15 +25,14 @@ UPRIGHT, LYING, CAP, TIMEOUT, BROKEN, TOUCHED = range(6)
 
 
 class World(NamedTuple):
-    """What does not change during a landing (SI). ``chain``: slices meet each other; else each has its own two stops.
+    """What does not change during a landing (SI).
 
-    ``touching`` is the gap below which two things touch [L]; a located impact leaves 1e-12.
-    ``low`` and ``high`` are those stops, from the tube's middle. ``saddle`` is E_s, ``upright`` and ``cap`` are the
-    tilts that part the basins [rad], ``cap_saddle`` is the saddle out of the basin of the cap.
+    ``touching`` is the gap below which two things touch [L]; a located impact leaves 1e-12. ``saddle`` is E_s,
+    ``upright`` and ``cap`` are the tilts that part the basins [rad], ``cap_saddle`` is the saddle out of the basin of
+    the cap.
     """
 
     n: int
-    chain: bool
     rigid: bool
     in_turn: bool
     half: float
@@ -49,8 +46,6 @@ class World(NamedTuple):
     e_table: float
     friction: float
     rod: float
-    low: FloatArray
-    high: FloatArray
     saddle: float
     upright: float
     cap: float

@@ -18,15 +18,10 @@ def gaps(s, q, world, out):
     n = world.n
     if world.rigid:
         return
-    if world.chain:
-        out[4] = world.half - world.rod / 2 - s[0]
-        for j in range(1, n):
-            out[4 + j] = s[j - 1] - s[j] - world.rod
-        out[4 + n] = s[n - 1] + world.half - world.rod / 2
-    else:
-        for i in range(n):
-            out[4 + i] = world.high[i] - s[i]
-            out[4 + n + i] = s[i] - world.low[i]
+    out[4] = world.half - world.rod / 2 - s[0]
+    for j in range(1, n):
+        out[4 + j] = s[j - 1] - s[j] - world.rod
+    out[4 + n] = s[n - 1] + world.half - world.rod / 2
 
 
 @merged
@@ -40,15 +35,10 @@ def rates(w, q, world, out):
     n = world.n
     if world.rigid:
         return
-    if world.chain:
-        out[4] = -w[0]
-        for j in range(1, n):
-            out[4 + j] = w[j - 1] - w[j]
-        out[4 + n] = w[n - 1]
-    else:
-        for i in range(n):
-            out[4 + i] = -w[i]
-            out[4 + n + i] = w[i]
+    out[4] = -w[0]
+    for j in range(1, n):
+        out[4 + j] = w[j - 1] - w[j]
+    out[4 + n] = w[n - 1]
 
 
 @merged
@@ -59,13 +49,6 @@ def seat(s, closed, world):
     """
     n = world.n
     if world.rigid:
-        return
-    if not world.chain:
-        for i in range(n):
-            if closed[4 + i]:
-                s[i] = world.high[i]
-            elif closed[4 + n + i]:
-                s[i] = world.low[i]
         return
     if closed[4]:
         s[0] = world.half - world.rod / 2

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import ode_reference
-from flipproof.landing.design import SPARE
-from flipproof.landing.work import REFERENCE, landed, saddle, touch_readings
+from flipproof.chapters.landing.throws import SPARE
+from flipproof.chapters.landing.work import REFERENCE, landed, saddle, touch_readings
 from slicemodel import Outcome, Scenario, Table, Touch
 from slicemodel.scenario import unknown_name
 from slicemodel.table import LAWS

@@ -1,53 +1,14 @@
-"""Many landings at once, and the flight that ends in a touch."""
+"""The turn of a bottle over no table, and which tables are reached."""
 
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import ode_reference
 from slicemodel import Scenario, Table
 
 WATER = Scenario(n_slices=8, water_mass=0.4, drag=0.2, duration=1.5)
-TABLE = Table(height=-0.35)
-
-
-def throws(count):
-    random = np.random.default_rng(2)
-    for k in range(count):
-        yield replace(
-            WATER,
-            frozen=k % 3 == 2,
-            omega0=random.uniform(12.0, 35.0),
-            theta0=math.pi / 2 + 0.1 * random.standard_normal(),
-        )
-
-
-@pytest.fixture(scope="module")
-def touches():
-    return [ode_reference.fly(throw, TABLE) for throw in throws(50)]
-
-
-@pytest.mark.parametrize(("law", "slices"), [(None, "exclude"), ("in-turn", "exclude"), ("together", "staggered")])
-@pytest.mark.parametrize("jobs", [1, 3])
-def test_a_batch_is_its_single_landings_to_the_last_bit(touches, law, slices, jobs):
-    batch = ode_reference.land_batch(touches, TABLE, law, slices, jobs=jobs)
-    for touch, outcome in zip(touches, batch, strict=True):
-        alone = ode_reference.land(touch, TABLE, None if touch.scenario.frozen else law, slices)
-        for name in ("outcome", "certified", "margin", "bounces", "slid", "reason", "diagnostics", "settings"):
-            assert getattr(outcome, name) == getattr(alone, name)
-    assert {outcome.outcome for outcome in batch} >= {"upright", "lying"}
-
-
-def test_an_empty_batch_is_empty():
-    assert ode_reference.land_batch([], TABLE) == []
-
-
-@pytest.mark.parametrize("jobs", [0, -1, 1.5, True, 10_000])
-def test_jobs_out_of_range_are_refused(touches, jobs):
-    with pytest.raises(ValueError, match="jobs = "):
-        ode_reference.land_batch(touches[:1], TABLE, jobs=jobs)
 
 
 def test_without_a_table_the_flight_is_the_same_until_the_touch():

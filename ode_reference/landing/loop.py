@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ode_reference.landing_core.contacts import first_zero, gaps, rates, seat
-from ode_reference.landing_core.layout import (
+from ode_reference.landing.contacts import first_zero, gaps, rates, seat
+from ode_reference.landing.layout import (
     ALOFT,
     BROKEN,
     CAP,
@@ -21,7 +21,7 @@ from ode_reference.landing_core.layout import (
     UPRIGHT,
     Landing,
 )
-from ode_reference.landing_core.motion import energy, impact, step
+from ode_reference.landing.motion import energy, impact, step
 from slicemodel.compiled import kept_on_disk
 
 
@@ -34,7 +34,7 @@ def land(q, s, w, dt, longest, fly, world, every, record):
     """
     n = world.n
     rows = 0
-    count = 4 if world.rigid else 4 + (n + 1 if world.chain else 2 * n)
+    count = 4 if world.rigid else 4 + n + 1
     gap, late, rate, ahead = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
     closed, touching, taking = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     free, target, work = np.empty(2), np.empty(4), np.empty((3, n + 1))

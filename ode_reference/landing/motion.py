@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ode_reference.landing_core.contacts import rates
-from ode_reference.landing_core.impulses import respond
-from ode_reference.landing_core.layout import MAX_ROUNDS, STILL
+from ode_reference.landing.contacts import rates
+from ode_reference.landing.impulses import respond
+from ode_reference.landing.layout import MAX_ROUNDS, STILL
 from slicemodel.compiled import merged
 
 

@@ -16,7 +16,7 @@ from slicemodel.observables import centre_of_mass, centre_of_mass_at_rest, toppl
 from slicemodel.scenario import ScenarioError
 
 READ: Final = ("touch_time", "touch_theta", "touch_omega", "touch_speed", "touch_energy", "static_margin")
-MAKER: Final = "flipproof.landing.work:make_landings"
+MAKER: Final = "flipproof.chapters.landing.work:make_landings"
 """What makes the rows of landings."""
 
 REFERENCE: Final = "ode_reference"

@@ -1,4 +1,4 @@
-"""The flight that ends in a touch: the throw from its release to the table, by the equations of ``landing_core``."""
+"""The flight that ends in a touch: the throw from its release to the table, by the landing's own equations."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from ode_reference.arguments import number_above, number_within
-from ode_reference.landing import state_of, world_of
-from ode_reference.landing_core.layout import TOUCHED, World
+from ode_reference.landing.land import state_of, world_of
+from ode_reference.landing.layout import TOUCHED, World
 from slicemodel.scenario import Scenario
 from slicemodel.table import Table, Touch
 from slicemodel.trajectory import FloatArray
@@ -23,7 +23,7 @@ FAR: Final = -1e4
 State = tuple[FloatArray, FloatArray, FloatArray]
 
 
-def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float = FLIGHT_DT) -> Touch:
+def fly(scenario: Scenario, table: Table, *, dt: float = FLIGHT_DT) -> Touch:
     """Throw a bottle until it comes down on a table; slices keep their room as in ``land``.
 
     Parameters
@@ -33,8 +33,6 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
     table : Table
         The bottle must be over it at release, or when its centre of mass is highest: a table may stand beside the
         thrower and higher than the hand.
-    slices : str
-        "exclude" or "staggered".
     dt : float
         Longest step [s], in [1e-6, 1e-3].
 
@@ -54,7 +52,7 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
     As ``land``: order 2 in ``dt`` between impacts, which are located.
     """
     dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
-    state, world = _released(scenario, table, slices)
+    state, world = _released(scenario, table)
     begin = 0.0
     if _room(state, world) <= 0.0:
         begin = scenario.launch_velocity[1] / scenario.gravity
@@ -82,22 +80,18 @@ def fly(scenario: Scenario, table: Table, slices: str = "exclude", *, dt: float 
     )
 
 
-def turn(
-    scenario: Scenario, every: float, slices: str = "exclude", *, dt: float = FLIGHT_DT
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def turn(scenario: Scenario, every: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return t [s], theta [rad] and the height of the lowest rim over O [m] of a flight over no table, shape (P,) each.
 
     Parameters
     ----------
     scenario : Scenario - the flight lasts for its duration
-    every : float - time between two instants [s], which are at most ``dt`` late
-    slices, dt : as for ``fly``
+    every : float - time between two instants [s], which are at most ``FLIGHT_DT`` late
     """
-    dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
     every = number_above("every", every, 0.0, scenario.duration)
-    (q, s, w), world = _released(scenario, Table(height=FAR), slices)
+    (q, s, w), world = _released(scenario, Table(height=FAR))
     record = np.full((math.ceil(scenario.duration / every) + 1, 7 + 2 * world.n), np.nan)
-    _loop(q, s, w, dt, scenario.duration, world, every, record)
+    _loop(q, s, w, FLIGHT_DT, scenario.duration, world, every, record)
     record[-1, :7] = scenario.duration, *q
     record = record[np.isfinite(record[:, 0])]
     theta = record[:, 3]
@@ -124,10 +118,10 @@ def release(scenario: Scenario) -> Touch:
     )
 
 
-def _released(scenario: Scenario, table: Table, slices: str) -> tuple[State, World]:
+def _released(scenario: Scenario, table: Table) -> tuple[State, World]:
     """Return the state at release over the table, and the world."""
     start = release(scenario)
-    world = world_of(start, table, "together", slices)
+    world = world_of(start, table, "together")
     q, s, w = state_of(start, world)
     q[0], q[1] = world.half * math.sin(start.theta), -world.half * math.cos(start.theta) - table.height
     return (q, s, w), world
@@ -157,7 +151,7 @@ def _loop(
     every: float = 1.0,
     record: FloatArray | None = None,
 ) -> Any:
-    from ode_reference.landing_core.loop import land
+    from ode_reference.landing.loop import land
 
     record = np.empty((0, 7 + 2 * world.n)) if record is None else record
     return land(q, s, w, dt, duration, True, world, every, record)

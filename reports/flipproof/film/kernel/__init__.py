@@ -1,0 +1,1 @@
+"""The compiled loops of a film's fit."""

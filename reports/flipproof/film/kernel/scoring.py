@@ -1,0 +1,167 @@
+"""Compiled: a curve between its rows, the points that it means, and the sums of Fisher's scoring over all clicks.
+
+A fit of a film asks these some ten thousand times, for a few dozen frames each, where NumPy's calls take longer than
+their arithmetic. Names and shapes are those of ``curves`` and ``likelihood``: P frames, B bodies, D coordinates, K
+inner parameters in the order of ``likelihood.POINTS``.
+"""
+
+import math
+
+import numpy as np
+
+from slicemodel.compiled import kept_on_disk
+
+
+@kept_on_disk()
+def curve_at(rows, slopes, step, moved, s):
+    """Return F, F', R, dR/ds, and dF, dR by ln omega_0 and by theta_0, at s (P,); shape (8, P).
+
+    ``rows`` (3, S) are ``step`` apart; ``slopes`` is (2, 3, S), or (0, 3, S) of an equation without weight; ``moved``
+    (2,) is how far ln omega_0 and theta_0 are from where the slopes were taken. The water rests before s = 0; after the
+    last row the bottle turns on evenly.
+    """
+    out = np.zeros((8, len(s)))
+    last = rows.shape[1] - 2
+    for i in range(len(s)):
+        if s[i] < 0.0:
+            out[0, i], out[1, i], out[2, i] = s[i], 1.0, rows[2, 0]
+            continue
+        k = min(int(s[i] / step), last)
+        x = min(s[i] / step - k, 1.0)
+        y = 1.0 - x
+        w0, w1 = rows[1, k], rows[1, k + 1]
+        rise = rows[0, k + 1] - rows[0, k]
+        late = max(s[i] - step * (last + 1), 0.0)
+        out[0, i] = rows[0, k] + x * rise + x * y * (y * (step * w0 - rise) - x * (step * w1 - rise)) + late * w1
+        out[1, i] = y * w0 + x * w1
+        out[2, i] = y * rows[2, k] + x * rows[2, k + 1]
+        out[3, i] = (rows[2, k + 1] - rows[2, k]) / step
+        for d in range(slopes.shape[0]):
+            for row in range(3):
+                slope = y * slopes[d, row, k] + x * slopes[d, row, k + 1]
+                out[row, i] += moved[d] * slope
+                if row != 1:
+                    out[4 + 2 * d + row // 2, i] = slope
+    return out
+
+
+@kept_on_disk()
+def points(turning, t, x):
+    """Return the cap's and the base's meant places (2, P, 2), and their slopes by the inner parameters (2, P, 2, K).
+
+    ``turning`` is what ``curve_at`` gives at |omega_0| (t - release).
+    """
+    values, slopes = np.zeros((2, len(t), 2)), np.zeros((2, len(t), 2, len(x)))
+    omega0, length = x[2], x[9]
+    sign = math.copysign(1.0, omega0)
+    for i in range(len(t)):
+        f, w, r, dr, f_omega, r_omega, f_theta, r_theta = turning[:, i]
+        tau = t[i] - x[0]
+        change = min(tau, 0.0)
+        held = 0.5 * change**2
+        theta = x[1] + sign * f + x[12] * held
+        u = (math.sin(theta), -math.cos(theta))
+        across = (-u[1], u[0])
+        # Slopes of theta and R by release, theta_0 and omega_0.
+        turn = (-omega0 * w - x[12] * change, 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0)
+        slide = (-abs(omega0) * dr, r_theta, sign * dr * tau + r_omega / omega0)
+        for body in range(2):
+            along = body - r
+            for d in range(2):
+                slope = slopes[body, i, d]
+                values[body, i, d] = (
+                    x[3 + d] + tau * x[5 + d] + 0.5 * tau**2 * x[7 + d] + held * x[10 + d] + length * along * u[d]
+                )
+                for k in range(3):
+                    slope[k] = length * (along * turn[k] * across[d] - slide[k] * u[d])
+                slope[0] -= x[5 + d] + tau * x[7 + d] + change * x[10 + d]
+                slope[3 + d], slope[5 + d], slope[7 + d], slope[10 + d] = 1.0, tau, 0.5 * tau**2, held
+                slope[9] = along * u[d]
+                slope[12] = length * along * held * across[d]
+    return values, slopes
+
+
+@kept_on_disk()
+def sums(missed, seen, slopes, variance, dv, log_good, log_bad):
+    """Return the cost of all values, its gradient (K,) and Fisher's information (K, K).
+
+    ``missed`` (B, P, D) is what values miss their meaning by, ``seen`` (B, P) whether they exist; ``variance`` (P,) has
+    the slopes ``dv`` (P, K); the logarithms are of the share of good values, and of the density of bad ones.
+    """
+    bodies, frames, coordinates = missed.shape
+    count, power = dv.shape[1], coordinates / 2
+    cost, gradient, information = 0.0, np.zeros(count), np.zeros((count, count))
+    for i in range(frames):
+        size = variance[i]
+        normal = log_good - power * math.log(2 * math.pi * size)
+        bend, weight = 0.0, 0.0  # of ln(variance)
+        for body in range(bodies):
+            if not seen[body, i]:
+                continue
+            q = 0.0
+            for d in range(coordinates):
+                q += missed[body, i, d] ** 2
+            q /= 2 * size
+            high, low = max(normal - q, log_bad), min(normal - q, log_bad)
+            both = high + math.log1p(math.exp(low - high))
+            good = math.exp(normal - q - both)
+            cost -= both
+            bend += good * (power - q)
+            weight += good * power
+            for d in range(coordinates):
+                slope = slopes[body, i, d]
+                pull = good / size * missed[body, i, d]
+                for k in range(count):
+                    if slope[k] != 0.0:
+                        gradient[k] -= pull * slope[k]
+                        part = good / size * slope[k]
+                        for m in range(k + 1):
+                            information[k, m] += part * slope[m]
+        for k in range(count):
+            change = dv[i, k] / size
+            if change != 0.0:
+                gradient[k] += bend * change
+                for m in range(k + 1):
+                    information[k, m] += weight * change * dv[i, m] / size
+    for k in range(count):
+        for m in range(k):
+            information[m, k] = information[k, m]
+    return cost, gradient, information
+
+
+@kept_on_disk()
+def turnings(angle, t, first, rates, rows, step, near):
+    """Return for every frame of ``first`` the turning that the angle follows best from there on, as rows (N, 5).
+
+    A row is its score, the index of its curve, omega_0, the angle at the release and the index of its last frame. Each
+    frame within ``near`` of the turning counts 1 less the square of its share of that; a turning ends where three of
+    four frames leave it. ``rates`` (N, M) are omega_0 to try, ``rows`` (C, 3, S) the curves.
+    """
+    best = np.zeros((len(first), 5))
+    for j in range(len(first)):
+        count = len(t) - first[j]
+        off = np.empty(count)
+        for m in range(rates.shape[1]):
+            omega0 = rates[j, m]
+            s = abs(omega0) * (t[first[j] :] - t[first[j]])
+            for c in range(len(rows)):
+                for i in range(count):
+                    k = min(int(s[i] / step), rows.shape[2] - 2)
+                    part = s[i] / step - k
+                    turned = rows[c, 0, k] + part * (rows[c, 0, k + 1] - rows[c, 0, k])
+                    off[i] = angle[first[j] + i] - math.copysign(turned, omega0) - angle[first[j]]
+                    off[i] -= 2 * math.pi * np.rint(off[i] / (2 * math.pi))
+                start = np.median(off[: min(5, count)])
+                score, end, left = 0.0, 0, 0
+                for i in range(count):
+                    away = off[i] - start
+                    away = abs(away - 2 * math.pi * np.rint(away / (2 * math.pi))) / near
+                    left = (left << 1 | (away > 1.0)) & 15
+                    if away < 1.0:
+                        score, end = score + 1.0 - away**2, i
+                    if (left & 1) + (left >> 1 & 1) + (left >> 2 & 1) + (left >> 3) >= 3:
+                        break
+                if end >= 5 and s[end] > 0.5 and score > best[j, 0]:
+                    best[j, 0], best[j, 1], best[j, 2] = score, c, omega0
+                    best[j, 3], best[j, 4] = start + angle[first[j]], first[j] + end
+    return best

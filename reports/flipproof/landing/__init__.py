@@ -1,1 +1,0 @@
-"""Does it stand? Throws that scatter, landed by the thousand, and what share of them ends upright."""
