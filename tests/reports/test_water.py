@@ -53,7 +53,7 @@ def test_what_was_recorded_is_whole_and_says_where_it_comes_from():
 
 
 def test_the_band_holds_our_own_fluid_and_the_recorded_ones():
-    """Where they disagree the band is as wide as both: half and three quarters full ours keeps less spin."""
+    """Where they disagree the band is as wide as both: from a half on ours keeps less spin than the recorded grid."""
     fills, low, high = fluid_band()
     for _, lowest, highest in (recorded_band(), own_band()):
         known = np.isfinite(lowest)

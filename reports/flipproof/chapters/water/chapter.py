@@ -33,9 +33,9 @@ from slicemodel.trajectory import FloatArray
 LIMITS: Final = (
     "May be said: from three quarters full on, overlap is refuted. At a half the plateau of Eq. 8 lies outside "
     "whatever start the water had. From a half on all equations spread the water too early, having no suction. The "
-    "recorded fluids keep more spin than ours, from a half to three quarters: they let swirl rub off on the bottle. "
+    "recorded grid keeps more spin than ours, from a half to three quarters: it lets swirl rub off on the bottle. "
     "A full bottle of water without vorticity must keep its ω; within half a second that was off by 5 % in the "
-    "recorded grid (16 cells), by 19 % in the recorded particles (4 mm), by 1.5 % in ours (16 cells). May not be "
+    "recorded grid (16 cells), by 19 % in the recorded particles (4 mm), by 1.1 % in ours (16 cells). May not be "
     "said: that these fluids are real water; any level better than 0.05 ω₀ for their numerics, or than 0.1 ω₀ for "
     "the start of the water, which no hand controls; anything at a filling of 0.1; that an equal plateau is equal "
     "physics. No measured track is public."
@@ -150,7 +150,7 @@ def figures(found: Water) -> Iterator[Exhibit]:
         caption="Mean of ω/ω₀ over the second half of the flight of the paper's own bottle. Shaded: what two crude "
         "fluids gave, with suction and without, at their resolutions; hatched: our own ideal water, likewise; bars: "
         "two fluids over the starts of their water. Below a quarter the fluids disagree, and from a half to three "
-        "quarters ours keeps less spin than the others. No fluid is thrown for this figure: all are recorded.",
+        "quarters ours keeps less spin than the recorded grid. No fluid is thrown for this figure: all are recorded.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction. Fluids {band}. {told}.",
         maker=figure_water,
         data=(found,),
