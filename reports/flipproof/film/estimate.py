@@ -292,8 +292,9 @@ def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> 
             for _ in range(2):
                 again = likelihood.fitted(curve, fit.x)
                 likelihood = settle(likelihood, curve, again.x)
-            if best is None or again.cost < best[0]:
-                best = again.cost, likelihood, again.x
+            cost = again.cost + (_off_gravity(again.x) if start.two else 0.0)
+            if best is None or cost < best[0]:
+                best = cost, likelihood, again.x
     return starts[0] if best is None else best[1:]
 
 
@@ -434,14 +435,19 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
             continue
         curve, end = every[int(index)], float(times[int(last)])
         x, noise = _placed(film, curve, np.array([times[k], start, omega0]), end, length)
-        touch, noise = end if held.touch is None else held.touch, max(noise, 1e-5)
-        # A turning that is a little wrong bends the parabola: one fit begins with gravity held near the earth's.
-        earthly = Likelihood(film, held, touch, noise)
-        earthly.expected[8], earthly.stiffness[8] = -GRAVITY, 0.5**-2
-        fit = earthly.fitted(curve, x, 8)
-        settled = settle(earthly, curve, fit.x)
-        for when, speed, begin in ((settled.touch, settled.speed, fit.x), (touch, TOUCH[1], x)):
-            better = _better(Likelihood(film, held, when, noise, speed), curve, begin)
+        noise = max(noise, 1e-5)
+        # The turning may go on like that on the table, which bends the parabola: fits begin with gravity near the
+        # earth's, too, and with an earlier touch.
+        ends = [end, times[k] + 0.7 * (end - times[k])] if held.touch is None else [held.touch]
+        begins = [(ends[0], TOUCH[1], x)]
+        for touch in ends:
+            earthly = Likelihood(film, held, touch, noise)
+            earthly.expected[8], earthly.stiffness[8] = -GRAVITY, 0.5**-2
+            fit = earthly.fitted(curve, x, 8)
+            settled = settle(earthly, curve, fit.x)
+            begins.append((settled.touch, settled.speed, fit.x))
+        for touch, speed, begin in begins:
+            better = _better(Likelihood(film, held, touch, noise, speed), curve, begin)
             if better[2][8] < 0.0:  # what accelerates upwards is no flight
                 tried.append(better)
     # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
@@ -464,7 +470,7 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
 
 
 def _off_gravity(x: FloatArray) -> float:
-    """Return the cost of a gravity unlike the earth's; at most 50, so that a clock or stick far off is found, too."""
+    """Return the cost of a gravity unlike the earth's, 50 at the most: a clock or a stick far off is found, too."""
     return min(50.0, 0.5 * ((math.hypot(x[7], x[8]) / GRAVITY - 1.0) / 0.1) ** 2)
 
 

@@ -22,6 +22,9 @@ Verdict = Literal["told", "bounded above", "bounded below", "cannot tell"]
 INDISTINCT: Final = 3.0
 """Difference of the logarithms of evidence up to which two equations are said to do equally well."""
 
+FALL_ERROR: Final = 0.25
+"""Relative error of g beyond which an equation explains no flight, however little the film says of g."""
+
 OUTDONE: Final = 20.0
 """Difference from which on an equation does not explain a film: it leaves to the hand what another takes for flight."""
 
@@ -118,9 +121,15 @@ class Judged:
         return f"{self.discrepancy:.2g}" if self.discrepancy >= limit else f"less than {limit:.1g}"
 
     @property
+    def falls(self) -> bool:
+        """Whether the fitted flight falls about as things do; so where nothing says how it falls."""
+        one = self.estimate
+        return not one.likelihood.two or abs(one.best["g"] / GRAVITY - 1.0) < FALL_ERROR
+
+    @property
     def explained(self) -> bool:
         """Whether noise alone leaves residuals of this size and order, and no other equation is far likelier."""
-        if self.behind > OUTDONE:
+        if self.behind > OUTDONE or not self.falls:
             return False
         spread = 5.0 / math.sqrt(max(4, len(self.missed)))
         return self.runs > 0.005 and self.noise <= max(self.own_noise, 1e-12) * (1.0 + spread)
@@ -268,6 +277,11 @@ class Judged:
                 f"the equation does not explain the film: it takes {int(self.flying.sum())} frames for flight, and "
                 f"another equation makes the film exp({self.behind:.0f}) times as likely; no interval is promised "
                 "to hold the truth"
+            )
+        if not self.falls:
+            return (
+                f"the equation does not explain the film: it fits {int(self.flying.sum())} frames alone, as a fall "
+                f"with g = {self.estimate.best['g']:.2g} m/s^2; no interval is promised to hold the truth"
             )
         unit = "rad/s" if self.estimate.film.quantity == "omega" else "degrees"
         order = (

@@ -153,7 +153,7 @@ class Likelihood:
         self.degrees = (13 if self.two else 3) - sum(fixed)
 
     def _priors(self) -> tuple[FloatArray, FloatArray]:
-        """Return where priors expect the inner parameters, and their inverse variances (0: no prior); each (K,)."""
+        """Return what priors expect, and their inverse variances, 0 where there is none; each (K,)."""
         held, noise = self.held, self.noise if self.held.noise is None else self.held.noise
         known = {"log_noise": (float(np.log(noise)), 3.0 if held.noise is None else TIGHT)}
         if held.release is not None:
