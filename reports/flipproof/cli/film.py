@@ -27,7 +27,9 @@ DELIMITERS = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
 def add_film(commands: Any) -> None:
     """Add the three commands."""
-    track = add_command(commands, "track", "Say what a video of a bottle flip tells, and cannot tell.", command_film)
+    track = add_command(
+        commands, "track", "Read a tracked video of a flip and state what it can and cannot show.", command_film
+    )
     track.add_argument(
         "files", nargs="+", type=Path, metavar="FILE", help="what Tracker's File > Export > Data File wrote, or a "
         "track.csv",

@@ -32,7 +32,7 @@ SPEC_HELP = (
 def add_foreign(commands: Any) -> None:
     """Add the commands."""
     certify = add_command(
-        commands, "certify", "Hold a solver to the conformance suite, a line a check.", command_certify
+        commands, "certify", "Test a solver with the conformance suite, one line per check.", command_certify
     )
     _add_spec(certify)
     certify.add_argument("--equation", metavar="E", help="hold it to this equation, whatever it declares")

@@ -49,7 +49,7 @@ def add_landing(commands: Any) -> None:
     land.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
 
     upright = add_command(
-        commands, "upright", "Count how many scattered throws end upright, or go on with it.", command_upright
+        commands, "upright", "Count how many scattered throws land upright, or resume the count.", command_upright
     )
     upright.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     upright.add_argument("--throws", type=count, default=300, metavar="N", help="throws a point (%(default)s)")

@@ -33,8 +33,8 @@ usage: flipproof COMMAND ...
 
 {_listed(FIRST, commands_of(self))}
 
-  flipproof help COMMAND   what a command takes
-  flipproof more           all other commands
+  flipproof help COMMAND   explain one command
+  flipproof more           list all other commands
 """
 
 

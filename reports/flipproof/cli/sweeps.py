@@ -21,11 +21,13 @@ size = reader(
 
 def add_sweeps(commands: Any) -> None:
     """Add the three commands."""
-    sweep = add_command(commands, "sweep", "Run many throws by many solvers, or go on with them.", command_sweep)
+    sweep = add_command(
+        commands, "sweep", "Run many throws with many solvers, or resume an interrupted sweep.", command_sweep
+    )
     sweep.add_argument("design", type=Path, metavar="SWEEP.toml", help="which fields vary, and which solvers")
     add_store(sweep)
 
-    drawn = add_command(commands, "map", "Map which mistake matters where, or go on with it.", command_map)
+    drawn = add_command(commands, "map", "Map which mistake matters where, or resume the map.", command_map)
     drawn.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     drawn.add_argument(
         "--axis", choices=("gamma", "step", "restitution"), required=True, help="what varies beside the fill fraction"
@@ -37,7 +39,7 @@ def add_sweeps(commands: Any) -> None:
     add_store(drawn)
 
     waterfall = add_command(
-        commands, "waterfall", "Split the published program's error over its assumptions, or go on with it.",
+        commands, "waterfall", "Split the published program's error over its assumptions, or resume.",
         command_waterfall,
     )  # fmt: skip
     waterfall.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)

@@ -32,7 +32,7 @@
       const value = (mean) => (mean === null ? "not computed" : `${Math.round(100 * mean)} %`);
       const means = data.solvers.map((name, k) => `${names[name]} ${value(cell.mean[k])}`).join(", ");
       const far = off(cell);
-      said.textContent = `Filling ${Number(cell.x.toPrecision(3))}, γ/ω₀ = ${Number(cell.y.toPrecision(2))}: late spin, of ω₀: ${means}. `
+      said.textContent = `At filling ${Number(cell.x.toPrecision(3))} and γ/ω₀ = ${Number(cell.y.toPrecision(2))} the late spin, as a share of ω₀, is: ${means}. `
         + `Off free flight: ${names[choice.value]} by ${Number.isFinite(far) ? `${Number((100 * far).toPrecision(2))} %` : "an unknown part"}. Largest fair share: ${cell.which || "unknown"}.`;
       const box = svg.querySelector(".map-here");
       box?.setAttribute("transform", svg.querySelector(`[data-cell="${i} ${j}"]`).dataset.place);

@@ -58,8 +58,8 @@
     }
     const apart = (from) => Object.keys(names).filter((name) => now[name] !== from(name)).map((name) => `${names[name]} ${percent(now[name], from(name))}`);
     find("said").textContent = changed
-      ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves at worst, as a share of ω₀: ${apart((name) => before[name]).join(", ")}.`
-      : `Largest difference from free flight, as a share of ω₀: ${apart(() => now["free-flight"]).join(", ")}.`;
+      ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves by at most, as shares of ω₀: ${apart((name) => before[name]).join(", ")}.`
+      : `The largest differences from free flight are, as shares of ω₀: ${apart(() => now["free-flight"]).join(", ")}.`;
     drawn = { thrown: { ...fixed, ...thrown }, curves: now, before, milliseconds: performance.now() - began };
   }
   function set(change) {
