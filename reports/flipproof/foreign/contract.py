@@ -38,13 +38,18 @@ MAX_NAME: Final = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
-    """What a solver is asked.
+    """What a solver is asked, many times in one process: nothing may be kept from one ask to the next.
+
+    Whatever ``Scenario`` admits may be asked: spin in either direction, any angle at release, one slice, gravity, drag
+    or restitution of 0.
 
     Parameters
     ----------
     scenario : Scenario - the throw; units stand in ``slicemodel.scenario``
-    times : array, shape (P,) - increasing times in [0, duration] at which to answer [s]
-    start : array, shape (N,) - positions of the slices at release, from the cap [m]; they are at rest in the bottle
+    times : array, shape (P,), P >= 1 - strictly increasing times in [0, duration] at which to answer [s]; the release
+        is t = 0, also where the first of them is later
+    start : array, shape (N,) - positions of the slices at release, from the cap [m], in any order, not only those of
+        ``scenario.initial_positions()``; the slices are at rest in the bottle
     effort : float or None - the number that ``Traits.refined_by`` names; None if it names nothing
     options : mapping - what the user gave the solver by name
     """
@@ -194,7 +199,8 @@ class Answer:
     """What a solver answered, checked: arrays of float64, finite, at the times asked.
 
     ``t`` [s], ``theta`` [rad], ``omega`` [rad/s], ``r_cm`` [m], ``inertia`` [kg m^2] have shape (P,), ``r`` [m] and
-    ``v`` [m/s] (P, N). What the solver did not give is None; r_cm and inertia follow from r by their definitions.
+    ``v`` [m/s] (P, N). theta goes on beyond a turn, unwrapped; v is measured in the bottle, from cap to base. What the
+    solver did not give is None; r_cm and inertia follow from r by their definitions.
     """
 
     t: FloatArray
