@@ -34,6 +34,7 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
     "third": patches("third"),
     "fourth": patches("fourth"),
     "fifth": patches("fifth"),
+    "sixth": patches("sixth"),
     "right": dict(RIGHT),
 }
 """Mistakes by list and name, and solvers without one."""

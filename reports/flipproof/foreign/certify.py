@@ -175,6 +175,8 @@ class _Asked(Runner):
     def __init__(self, runner: Runner) -> None:
         self.runner, self.traits = runner, runner.traits
         self.kept: dict[tuple[Any, ...], Answer] = {}
+        self.unanswered: Ask | None = None
+        self.explained = False
         self.domain: dict[str, tuple[float, float]] = {}
 
     def __call__(self, ask: Ask) -> Answer:
@@ -185,7 +187,11 @@ class _Asked(Runner):
 
     def again(self, ask: Ask) -> Answer:
         """Return the answer, also to what was asked before."""
-        answer = self.runner(ask)
+        try:
+            answer = self.runner(ask)
+        except ForeignError:
+            self.unanswered = ask
+            raise
         for name, (_, value) in VARIED.items():
             here = np.append(value(ask), self.domain.get(name, ()))
             self.domain[name] = float(here.min()), float(here.max())
@@ -217,8 +223,10 @@ def certify(
     made: dict[str, Check] = {**CHECKS, "elsewhere": partial(elsewhere.check_elsewhere, seed=seed)}
     for name in names:
         result = _result(name, made[name], traits, asked)
-        same = next((one.check for one in results if result.found is None and one.reason == result.reason), "")
-        results.append(replace(result, reason=f"as in {same}") if same and result.verdict == FAILED else result)
+        if result.verdict == FAILED and result.found is None:
+            same = [one.check for one in results if one.found is None and one.reason.startswith(result.reason)]
+            result = replace(result, reason=f"as in {same[0]}") if same else result
+        results.append(result)
         say(results[-1])
         if until_failed and results[-1].verdict == FAILED:
             return Certificate(traits=declared, results=tuple(results), domain=asked.domain)
@@ -240,13 +248,46 @@ def _result(name: str, check: Check, traits: Traits, asked: _Asked) -> Result:
     except NotApplicableError as why:
         return result(verdict=IDLE, reason=str(why))
     except ForeignError as error:
-        words = f"{error}; known: {known}" if known else str(error)
+        words = f"{error}; known: {known}" if known else f"{error}{_answered_without(asked)}"
         return result(verdict=FAILED if known is None else EXPECTED, reason=words)
     if found.holds and known is not None:
         return result(verdict=FAILED, found=found, reason=f"declared as a failure ({known}), but holds")
     if found.holds:
         return result(verdict=WEAK if found.weak else PASSED, found=found)
     return result(verdict=FAILED if known is None else EXPECTED, found=found, reason=f"known: {known}" if known else "")
+
+
+def _answered_without(asked: _Asked) -> str:
+    """Return without what the ask is answered that was not, of weight, drag and impacts, and what to look at.
+
+    Asked once a solver, and only if it answers a throw without any of them.
+    """
+    ask, asked.unanswered = asked.unanswered, None
+    if ask is None or asked.explained or ask.scenario.frozen:
+        return ""
+    asked.explained = True
+    throw = ask.scenario
+    share = min(1.0, 1.0 / (abs(throw.omega0) * throw.duration))  # a radian, before most impacts
+    short = replace(ask, scenario=replace(throw, duration=share * throw.duration), times=share * ask.times)
+    simpler = {
+        "": replace(short, scenario=replace(short.scenario, gravity=0.0, drag=0.0)),
+        "weight": replace(ask, scenario=replace(throw, gravity=0.0)),
+        "drag": replace(ask, scenario=replace(throw, drag=0.0)),
+        "impacts": short,
+    }
+    for name, one in simpler.items():
+        try:
+            asked(one)
+        except WaitingError:
+            return ""
+        except ForeignError:
+            if not name:
+                return ""
+        else:
+            if name:
+                when = "up to the first impact" if name == "impacts" else f"without {name}"
+                return f"; the same is answered {when}: look at {elsewhere.LOOK_AT[name]}"
+    return ""
 
 
 def _enough(results: Iterable[Result]) -> Result:

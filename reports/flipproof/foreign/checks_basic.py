@@ -52,7 +52,7 @@ def check_start(traits: Traits) -> Making:
     late = (answer.theta[0] - throw.theta0) / throw.omega0
     drifted = worst == "theta" and bound < late < 0.02  # a step or two; answers may belong to other times
     sloped = worst == "omega" and bound < off[worst] < 0.05
-    shared = worst == "r" and answer.r is not None and float(np.max(np.ptp(answer.r, axis=0))) == 0.0
+    hint = _of_places(ask, answer) if worst == "r" and answer.r is not None else ""
     return Found(
         holds=off[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
@@ -60,9 +60,22 @@ def check_start(traits: Traits) -> Making:
         where=f"t = 0 s, theta_0 = {throw.theta0:.3g} rad, omega_0 = {throw.omega0:g} rad/s",
         advice=("answer at ask.times themselves; " if drifted else "")
         + ("omega is that of the instant, not a slope of theta between two times; " if sloped else "")
-        + ("r is the same at all times: keep a copy of the slices' places for each; " if shared else "")
-        + "begin at scenario.theta0, scenario.omega0 and ask.start, with all slices at rest",
+        + (hint or "begin at scenario.theta0, scenario.omega0 and ask.start, with all slices at rest"),
     )
+
+
+def _of_places(ask: Ask, answer: Answer) -> str:
+    """Return what else than a wrong beginning explains places that are not those of the start."""
+    assert answer.r is not None
+    off = np.abs(answer.r[0] - ask.start)
+    if not np.ptp(answer.r, axis=0).any():
+        return "r is the same at all times: keep a copy of the slices' places for each"
+    if np.allclose(np.sort(answer.r[0]), np.sort(ask.start), rtol=1e-6, atol=0.0):
+        return "r holds the places of ask.start in another order: every slice keeps its column"
+    for name, half in (("single", np.float32), ("half", np.float16)):
+        if np.all(off <= np.finfo(half).eps * ask.start):
+            return f"r is rounded to {name} precision: declare it, or keep the digits"
+    return ""
 
 
 def check_determinism(traits: Traits) -> Making:
@@ -122,7 +135,8 @@ def check_inputs(traits: Traits) -> Making:
         expected="other numbers for another question",
         came=f"the same numbers to the last bit with {' and with '.join(same)}" if same else "other numbers each time",
         where=f"{len(others)} parts of the question, each changed alone after the throw of most checks",
-        advice="read it from the question, and keep no answer under a part of the question",
+        advice="read it from the question, and keep no answer under a part of the question"
+        + ("; or no slice strikes an end: look at what moves them" if same == ["another restitution"] else ""),
     )
 
 
@@ -194,7 +208,10 @@ def check_ice(traits: Traits) -> Making:
         where=f"scenario.frozen = True, {when(ask.times, off[worst])}",
         advice="theta is off by whole turns: do not wrap it"
         if wrapped
-        else "hold every slice where it is when scenario.frozen is true, and let theta go on from theta_0",
+        else "omega and the slices are right, theta alone is not: theta advances by omega dt over every step, also the "
+        "last one before a time asked; look at the clock, and at the inertia by which theta is advanced"
+        if worst == "theta"
+        else "hold every slice where it is when scenario.frozen is true",
         facts={"drift": float(off["omega"].max())},
     )
 
@@ -223,7 +240,7 @@ def check_angle(traits: Traits) -> Making:
         advice="fly to the last of ask.times, however late that is"
         if stops
         else f"{hint}theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a "
-        "step with an impact",
+        "step with an impact; or the omega answered is not the one by which theta advances",
         facts={"angle": sizes},
     )
 
@@ -342,7 +359,7 @@ SIMPLER: Final = {"weight": replace(THROW, gravity=0.0), "drag": replace(THROW, 
 def _right_without(sizes: Sequence[float], most: float) -> str:
     """Return without what a difference is no larger than ``most``, and what to look at; ``sizes`` as in ``SIMPLER``."""
     right = [name for name, size in zip(SIMPLER, sizes, strict=True) if size <= most]
-    return elsewhere.RIGHT_WITHOUT[right[0]] if right else ""
+    return elsewhere.right_without(right[0]) if right else ""
 
 
 def _refined(traits: Traits, points: int = 61) -> list[Ask]:

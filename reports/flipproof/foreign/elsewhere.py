@@ -248,22 +248,26 @@ def drawn(seed: int) -> tuple[Knobs, ...]:
                 velocity=tuple(rng.uniform(-3.0, 3.0, 2).round(2).tolist()),
             )
         )
-    throws = [_shortened(knobs, seed) for knobs in throws]
+    throws = [_shortened(knobs, seed, MAX_IMPACTS) for knobs in throws]
     return (*throws, *(replace(knobs, frozen=True) for knobs in throws))
 
 
 MAX_IMPACTS: Final = 100
 """Impacts of a throw beyond one a slice: more, of elastic ones or in a light bottle, say no more and take long."""
 
+FEW_IMPACTS: Final = 20
+"""The same where one knob is turned: after many impacts a right solver's own error counts, too."""
 
-def _shortened(knobs: Knobs, seed: int) -> Knobs:
-    """Return a throw that ends, by Eq. 8 and in free flight, after its hundredth impact and one more a slice."""
+
+def _shortened(knobs: Knobs, seed: int, impacts_left: int) -> Knobs:
+    """Return a throw that ends, by Eq. 8 and in free flight, after so many impacts and one more a slice."""
     whole = replace(knobs, times="at the end alone").ask(seed)
     share = 1.0
     for model in ("eq8", "free-flight"):
         impacts = ode_reference.solve(started(whole), model, whole.times).impacts
-        if impacts is not None and len(impacts.time) > MAX_IMPACTS + knobs.slices:
-            share = min(share, 0.99 * float(impacts.time[MAX_IMPACTS + knobs.slices]) / whole.scenario.duration)
+        last = impacts_left + knobs.slices
+        if impacts is not None and len(impacts.time) > last:
+            share = min(share, 0.99 * float(impacts.time[last]) / whole.scenario.duration)
     return replace(knobs, angle=share * knobs.angle)
 
 
@@ -308,7 +312,8 @@ class Judged:
     """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
 
     ``own`` is the solver's own error of omega where it was judged, ``error`` says why there is no answer, ``since``
-    up to which impact it is right, and ``passed`` how many impacts that are.
+    up to which impact it is right, ``passed`` how many impacts that are, and ``alone`` which slice is the first to be
+    wrong, if it is a single one.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
@@ -318,6 +323,7 @@ class Judged:
     error: str = ""
     since: str = ""
     passed: int = 0
+    alone: str = ""
 
     @property
     def farthest(self) -> float:
@@ -355,7 +361,7 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         rooms[name] = floor + OWN * owns[name] + BAND * sum(summed(sizes(truth, twin, name)) for twin in twins)
     clear = rooms["omega"] <= BLURRED
     wrong: dict[str, tuple[float, float, float]] = {}
-    first = float(ask.times[-1])
+    first, alone = float(ask.times[-1]), ""
     for name in given:
         off = sizes(mine, truth, name)[clear]
         room = rooms[name][clear]
@@ -369,7 +375,10 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         k = int(np.argmax(rows / room))
         if not rows[k] <= room[k]:
             wrong[name] = float(rows[k]), float(room[k]), float(ask.times[k])
-            first = min(first, float(ask.times[:reached][clear][np.argmax(rows > room)]))
+            row = int(np.argmax(rows > room))
+            first = min(first, float(ask.times[:reached][clear][row]))
+            if name == "r" and ask.scenario.n_slices > 1 and np.count_nonzero(off[row] > room[row]) == 1:
+                alone = f", slice {int(np.argmax(off[row]))} alone"
     if mine.impacts is not None and clear.any():
         room_of_r = rooms.get("r", rooms["omega"])[clear]
         if late := _unmatched(ask, mine.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]):
@@ -382,6 +391,7 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         share=float(np.mean(clear)) * reached / len(ask.times),
         since=since,
         passed=passed,
+        alone=alone,
     )
 
 
@@ -393,8 +403,16 @@ def _since(ask: Ask, impacts: Impacts, first: float) -> tuple[int, str]:
     if not between.size:
         return before, f"after {before} impacts that were right" if before else "before the first impact"
     k = int(between[0])
-    which = f"slice {impacts.slice[k]} on the {'base' if impacts.end[k] > 0 else 'cap'} at {impacts.time[k]:.3g} s"
-    return before, f"after {f'{before} impacts that were right, ' if before else ''}the impact of {which}"
+    together = between[np.abs(impacts.time[between] - impacts.time[k]) < 1e-9 * ask.scenario.duration]
+    ends = {"base" if end > 0 else "cap" for end in impacts.end[together].tolist()}
+    which = f"slice {impacts.slice[k]} on the {ends.pop()}"
+    if len(together) > 1:
+        which = f"slices {', '.join(map(str, impacts.slice[together].tolist()))} {AT_ONCE}"
+    so_far = f"{before} impacts that were right, " if before else ""
+    return before, f"after {so_far}the impact of {which} at {impacts.time[k]:.3g} s"
+
+
+AT_ONCE: Final = "at one instant"
 
 
 NO_IMPACTS: Final = Impacts(np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
@@ -433,6 +451,7 @@ def _unmatched(
 
 
 Judging = Generator[Sequence[Ask], Sequence[Answer], list[Judged]]
+Asking = Generator[Sequence[Ask], Sequence[Answer], str]
 
 
 def judging(
@@ -543,27 +562,32 @@ def bisected(
     paper, ice = replace(PAPER, frozen=knobs.frozen), "in ice " if knobs.frozen else ""
     (base,) = yield from how([paper])
     if base.wrong:
-        return f"{ice}{_wrong_words(base)} on the paper's throw, too", _field_advice(base)
-    turned = yield from how([replace(paper, **{name: getattr(knobs, name)}) for name in names])
-    alone = {name: one for name, one in zip(names, turned, strict=True) if one.wrong}
-    if alone:
-        name = max(alone, key=lambda each: alone[each].excess)
-        return (
-            f"{ice}right at {said(PAPER, name)}, wrong at {said(knobs, name)}: {_wrong_words(alone[name])}",
-            f"{_impact_advice(alone[name])}{WORDS[name][1]}{_field_advice(alone[name], '; ')}",
-        )
-    turned = yield from how([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
-    for name, back in zip(names, turned, strict=True):
-        if not back.wrong and back.share > 0.3:
+        without = "" if knobs.frozen else (yield from simplified(traits, equation, unrefined))
+        return f"{ice}{_wrong_words(base)} on the paper's throw, too", f"{without}{_field_advice(base)}"
+    single = [_shortened(replace(paper, **{name: getattr(knobs, name)}), seed, FEW_IMPACTS) for name in names]
+    turned = sorted(zip(names, single, (yield from how(single)), strict=True), key=lambda one: -one[2].excess)
+    for name, throw, first in turned:
+        alone = (yield from confirmed(traits, throw, first, seed, equation, unrefined)) if first.wrong else first
+        if alone.wrong:
             return (
-                f"{ice}right at {said(PAPER, name)}, wrong at {said(knobs, name)} where other things are changed, too: "
-                f"{lost}",
-                f"{_impact_advice(judged)}{WORDS[name][1]}{_field_advice(judged, '; ')}",
+                f"{ice}right at {said(PAPER, name)}, wrong at {said(knobs, name)}: {_wrong_words(alone)}",
+                f"{_impact_advice(alone)}{WORDS[name][1]}{_field_advice(alone, '; ')}",
             )
+    backs = yield from how([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
+    again = [name for name, back in zip(names, backs, strict=True) if not back.wrong and back.share > 0.3]
+    if 0 < len(again) <= 4:
+        here, there = (
+            " or ".join(said(PAPER, name) for name in again),
+            " and ".join(said(knobs, name) for name in again),
+        )
+        return (
+            f"{ice}right at {here}, wrong at {there} where other things are changed, too: {lost}",
+            f"{_impact_advice(judged)}{'; or '.join(WORDS[name][1] for name in again)}{_field_advice(judged, '; ')}",
+        )
     return f"{ice}{lost} where {', '.join(said(knobs, name) for name in names)}", _field_advice(judged)
 
 
-def on_the_paper(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequence[Answer], str]:
+def on_the_paper(traits: Traits, equation: str) -> Asking:
     """Return what is wrong on a throw with drag and impacts on both ends, beyond the solver's own error; or nothing."""
     (judged,) = yield from judging(traits, [WHOLE], 0, equation, UNREFINED)
     if judged.wrong:
@@ -571,33 +595,56 @@ def on_the_paper(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequ
     return _wrong_words(judged) if "omega" in judged.wrong else ""
 
 
-RIGHT_WITHOUT: Final[Mapping[str, str]] = {
-    "weight": "right without weight: look at the weight term, g cos(theta) along the bottle; ",
-    "drag": "right without drag: look at the drag, alpha v / m, and against what v is measured; ",
-    "impacts": "right before the first impact: look at impacts (restitution, recoil, their places) and rests; ",
+LOOK_AT: Final[Mapping[str, str]] = {
+    "weight": "the weight term, g cos(theta) along the bottle",
+    "drag": "the drag, alpha v / m, and against what v is measured",
+    "impacts": "impacts: restitution, recoil, their places, which slices take part",
+    "rests": "rests: when a slice begins to rest on base or cap, when it is let go, and its part in what others do",
 }
-"""What to look at if an answer is right without weight, drag or impacts, in the order in which this is asked."""
+"""What to look at if an answer is right without weight, drag, impacts or rests, in the order in which this is asked."""
 
 
-def simplified(traits: Traits, equation: str) -> Generator[Sequence[Ask], Sequence[Answer], str]:
-    """Return without what a throw is right, if anything tells: weight, drag, impacts; and what to look at then."""
-    simpler = {
-        "weight": replace(WHOLE, gravity=0.0),
-        "drag": replace(WHOLE, damping=0.0),
-        "impacts": replace(WHOLE, angle=1.0),
-        "all": replace(WHOLE, gravity=0.0, damping=0.0, angle=1.0),
-    }
-    first, *others = yield from judging(traits, [WHOLE, *simpler.values()], 0, equation, UNREFINED)
-    if not first.wrong:
+def right_without(name: str) -> str:
+    """Return the advice for an answer that is right without one of ``LOOK_AT``."""
+    return f"right {'before the first impact' if name == 'impacts' else f'without {name}'}: look at {LOOK_AT[name]}; "
+
+
+RESTLESS: Final = replace(WHOLE, start="scattered", restitution=1.0, damping=0.0, angle=6.0)
+"""A throw with weight and impacts on both ends in which no slice ever rests."""
+
+STICKY: Final = replace(WHOLE, restitution=0.05, omega0=8.0)
+"""One in which slices rest on either end, and weight lets them go."""
+
+
+def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> Asking:
+    """Return without what a throw is right, if anything tells: weight, drag, impacts, rests; and what to look at."""
+    for whole in (WHOLE, STICKY):
+        (first,) = yield from judging(traits, [whole], 0, equation, unrefined)
+        if first.wrong:
+            break
+    else:
         return ""
+    simpler = {
+        "weight": replace(whole, gravity=0.0),
+        "drag": replace(whole, damping=0.0),
+        "impacts": replace(whole, angle=1.0),
+        "rests": RESTLESS,
+        "all": replace(whole, gravity=0.0, damping=0.0, angle=1.0),
+    }
+    others = yield from judging(traits, list(simpler.values()), 0, equation, unrefined)
     right = {name for name, judged in zip(simpler, others, strict=True) if not judged.wrong}
+    since = f"with all of it first wrong {first.since}{first.alone}; "
     if {"weight", "impacts"} <= right:
-        return "right without weight, and without impacts: look at when slices rest on an end and weight lifts them; "
-    for name, advice in RIGHT_WITHOUT.items():
+        if "rests" in right:
+            return f"right without weight, and without rests: look at {LOOK_AT['rests']}; {since}"
+        return f"right without weight, and before half a turn: look at {LOOK_AT['weight']}, at every angle; {since}"
+    if {"rests", "impacts"} <= right:
+        return f"right through impacts as long as no slice rests: look at {LOOK_AT['rests']}; {since}"
+    for name in ("weight", "drag", "impacts"):
         if name in right:
-            return advice
+            return f"{right_without(name)}{since}"
     if "all" in right:
-        return "right without weight, drag and impacts, and wrong without any single one of them; "
+        return f"right without weight, drag and impacts, and wrong without any single one of them; {since}"
     return (
         "wrong before the first impact without weight and drag, too: look at the centrifugal term omega^2 (r - r_cm), "
         "the inertia and the masses; "
@@ -614,13 +661,15 @@ def _wrong_words(judged: Judged) -> str:
     unit = {**units, "impacts": "the flight"}.get(worst[0], "L")
     also = f", and {', '.join(worst[1:])}" if len(worst) > 1 else ""
     is_off = f"{'are' if worst[0] == 'impacts' else 'is'} {off:.2g} of {unit} off (room {room:.1g})"
-    since = f", first {judged.since}" if judged.since else ""
+    since = f", first {judged.since}{judged.alone}" if judged.since else ""
     return f"{worst[0]} {is_off} at t = {time:.3g} s{also}{since}"
 
 
 def _impact_advice(judged: Judged) -> str:
     """Return that impacts come first, where omega is right through some of them and wrong later."""
     late = judged.passed and "omega" in judged.wrong
+    if AT_ONCE in judged.since:
+        return "several slices strike at one instant there, and each keeps its own speed times -e; "
     return (
         "right through some impacts: look first at impacts, their order and number, and at rests and their ends; "
         if late
@@ -629,8 +678,8 @@ def _impact_advice(judged: Judged) -> str:
 
 
 def _field_advice(judged: Judged, before: str = "") -> str:
-    """Return what to look at by the fields that are wrong, if omega is right."""
-    if judged.error or "omega" in judged.wrong:
+    """Return what to look at by the fields that are wrong, if omega is right and no impact was."""
+    if judged.error or "omega" in judged.wrong or judged.passed:
         return ""
     only = ", ".join(judged.wrong)
     return f"{before}omega is right, {only} not: look at how the answer is put together"

@@ -392,7 +392,7 @@ def test_a_rest_that_holds_too_long_is_seen_and_named():
     )
     (result,) = certify(InProcess(held.solver(), "x"), ["equation"]).results
     assert result.verdict == FAILED
-    assert "look at when slices rest on an end and weight lifts them" in result.line
+    assert "right without weight, and without rests: look at rests" in result.line
 
 
 def test_throws_are_drawn_anew_by_a_seed():
