@@ -7,6 +7,7 @@ import pytest
 
 from flipproof.build import ask_of
 from flipproof.chapters.water.chapter import CHAPTER, claims, figures, summary, verdict
+from flipproof.chapters.water.statements import flights, held, standing
 from flipproof.chapters.water.study import (
     DISCS,
     EQUATIONS,
@@ -16,6 +17,7 @@ from flipproof.chapters.water.study import (
     fluids,
     late_fluid,
     own_band,
+    own_flights,
     own_fluid,
     recorded_band,
     start_band,
@@ -23,6 +25,9 @@ from flipproof.chapters.water.study import (
 )
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import make
+from flipproof.paper.cases import family
+from flipproof.paper.experiment import OBSERVATIONS
+from flipproof.paper.observe import steady_level
 from ode_reference import ideal_water
 from slicemodel import Scenario
 
@@ -97,6 +102,25 @@ def test_by_plateau_rods_come_nearest_and_overlap_is_worst_in_a_full_bottle(foun
     assert found.at("rods", 1.0) == pytest.approx(1.0, abs=1e-12)
     # When the water spreads is another matter: without suction it parts too early.
     assert all(found.time("rods", filling) < flight["early"] for filling, flight in late_fluid().items())
+
+
+def test_our_own_fluid_is_held_against_what_the_text_says_of_real_bottles():
+    for suction in (False, True):
+        recorded = flights(suction=suction)
+        assert recorded.made.keys() == recorded.halved.made.keys() == {case.key for case in family("filling")}
+        # Nothing moves in a full bottle: it turns on.
+        full = recorded.at("filling", 1.0)
+        assert full.theta[-1] == pytest.approx(full.scenario.theta0 + full.scenario.omega0 * full.t[-1], abs=1e-3)
+        half = recorded.at("filling", 0.5)
+        (kept,) = [f for f in own_flights(start="spinning", suction=suction) if (f["filling"], f["cells"]) == (0.5, 16)]
+        assert steady_level(half) == pytest.approx(kept["plateau"], abs=2e-3)
+    statements = held()
+    assert len(statements) == len(OBSERVATIONS) - 1
+    verdicts = {each.says: [reading.verdict for reading in each.readings] for each in statements}
+    assert verdicts["At M̃ = 0.75 ω is already clearly reduced."] == ["holds", "holds"]
+    assert verdicts["M̃ = 0.10 behaves very much like ice."] == ["fails", "fails"]
+    counts = [sum(pair[k] == "holds" for pair in verdicts.values()) for k in (0, 1)]
+    assert f"no suction agrees with {counts[0]}, ideal water, suction agrees with {counts[1]}" in standing(statements)
 
 
 def test_own_inertia_raises_the_plateau(found):

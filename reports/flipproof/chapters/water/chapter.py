@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from flipproof.chapters.water.statements import NAMES, Held, held, standing
 from flipproof.chapters.water.study import (
     DISCS,
     EQUATIONS,
@@ -67,6 +68,9 @@ class Verdict(NamedTuple):
     recorded: Any
     own: Any
     curves: tuple[float, ...]
+    statements: tuple[Held, ...]
+    agrees: str
+    kinds: tuple[str, ...] = tuple(NAMES.values())
     limits: str = LIMITS
 
 
@@ -121,6 +125,8 @@ def verdict(found: Water) -> Verdict:
         fluids(),
         own_fluid(),
         tuple(late),
+        (statements := held()),
+        standing(statements),
     )
 
 

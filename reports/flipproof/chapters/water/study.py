@@ -105,8 +105,9 @@ def start_band() -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def late_fluid() -> Mapping[float, Mapping[str, Any]]:
     """Return by filling, from a quarter on, the flight of our own fluid with suction on its finest grid."""
-    flights = sorted(own_flights(start="spinning", suction=True), key=lambda flight: flight["cells"])
-    return {flight["filling"]: flight for flight in flights if flight["filling"] >= 0.25}
+    flights = own_flights(start="spinning", suction=True)
+    finest = max(flight["cells"] for flight in flights)
+    return {f["filling"]: f for f in flights if f["cells"] == finest and f["filling"] >= 0.25}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

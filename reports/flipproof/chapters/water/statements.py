@@ -1,0 +1,99 @@
+"""What the paper's text says of the bottles really thrown, held against our own recorded fluid."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from flipproof.chapters.water.study import OWN_CELLS, own_fluid
+from flipproof.frame.solvers import Made, Run
+from flipproof.paper.cases import family
+from flipproof.paper.experiment import OBSERVATIONS, compare
+from flipproof.paper.observe import Flights
+from flipproof.paper.statements import MARKS, Reading
+from slicemodel import Scenario, Trajectory
+
+NAMES: Final = {False: "ideal water, no suction", True: "ideal water, suction"}
+"""Name of our own fluid by whether it has suction."""
+
+
+class Held(NamedTuple):
+    """A statement of the text, and the number of either fluid that it is held against."""
+
+    says: str
+    means: str
+    readings: tuple[Reading, ...]
+
+    @property
+    def cells(self) -> tuple[tuple[str, str, str, str], ...]:
+        """Return sign, colour, verdict and number of each fluid."""
+        words = {"holds": "agrees", "fails": "disagrees"}
+        return tuple(
+            (*MARKS[one.verdict], words.get(one.verdict, one.verdict), one.value_text) for one in self.readings
+        )
+
+
+def held() -> tuple[Held, ...]:
+    """Return every statement about water with the readings of both fluids; ice is not thrown."""
+    fluids = [flights(suction=suction) for suction in NAMES]
+    return tuple(
+        Held(each.says, each.means, tuple(compare(each, fluid) for fluid in fluids))
+        for each in OBSERVATIONS
+        if each.id != "ice"
+    )
+
+
+def standing(statements: tuple[Held, ...]) -> str:
+    """Return with how many statements either fluid agrees, in words."""
+    counts = [sum(each.readings[k].verdict == "holds" for each in statements) for k in range(len(NAMES))]
+    words = (f"{name} agrees with {count}" for name, count in zip(NAMES.values(), counts, strict=True))
+    return f"Of the {len(statements)} statements about water {', '.join(words)}."
+
+
+def flights(*, suction: bool) -> Flights:
+    """Return the recorded flights over the filling; half of the cells tells how sure a number is."""
+    fine, coarse = (
+        {
+            case.key: _made(case.scenario, curve)
+            for case in family("filling")
+            if (curve := _curve(case.value, cells, suction))
+        }
+        for cells in (OWN_CELLS, OWN_CELLS // 2)
+    )
+    name = NAMES[suction]
+    return Flights(solver=name, made=fine, halved=Flights(solver=name, made=coarse))
+
+
+def _curve(filling: float, cells: int, suction: bool) -> list[float] | None:
+    """Return omega / omega_0 of the recorded flight whose water spins with the bottle at release; None without one."""
+    for flight in own_fluid()["flights"]:
+        kind = flight["start"], flight["cells"], flight["suction"]
+        if kind == ("spinning", cells, suction) and abs(flight["filling"] - filling) < 1e-9:
+            omega: list[float] = flight["omega"]
+            return omega
+    return None
+
+
+def _made(scenario: Scenario, curve: list[float]) -> Made:
+    """Return a recorded curve as a flight without slices; theta is its integral by the rule of trapezia.
+
+    Centre of mass and inertia are not recorded and stand as 0: the statements are about the turning alone.
+    """
+    t, none = np.linspace(0.0, scenario.duration, len(curve)), np.zeros(len(curve))
+    omega = scenario.omega0 * np.array(curve)
+    turned = np.cumsum((omega[1:] + omega[:-1]) / 2 * np.diff(t))
+    empty = np.empty((0, scenario.n_slices))
+    run = Trajectory(
+        scenario=scenario,
+        solver="ideal-water",
+        method="recorded",
+        t=t,
+        theta=scenario.theta0 + np.concatenate([[0.0], turned]),
+        omega=omega,
+        r_cm=none,
+        inertia=none,
+        r=empty,
+        v=empty,
+    )
+    return Made(Run("ideal-water", scenario), run, 0.0)
