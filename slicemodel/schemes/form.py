@@ -99,3 +99,8 @@ class Scheme:
     reason: str
     model: str = ""
     constants: Callable[[Scenario], StepConstants] = constants_of
+
+    @property
+    def order(self) -> float:
+        """The order in the step before impacts: 2 with coefficients of the mid-step, 1 with those of its start."""
+        return 2.0 if self.form.midpoint else 1.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_up import trajectory_of
 
-from flipproof.chapters.agreement.chapter import study_agreement
+from flipproof.chapters.agreement.chapter import claims, study_agreement
 from flipproof.frame.solvers import Missing
 from slicemodel import Scenario
 
@@ -58,6 +58,10 @@ def test_a_band_may_vary_in_time_and_one_time_in_twenty_may_lie_outside():
     assert few.pair("a", "b").agree
     assert few.pair("a", "b").share < 1.0
     assert few.until == pytest.approx(0.42)
+    assert not few.whole
+    (finding,) = claims({"free-flight": few})
+    assert finding.title.endswith(", up to 420 ms")
+    assert study_agreement(runs, {"a": 1e-3, "b": 0.0}).whole
 
 
 def test_runs_of_different_throws_or_times_are_refused():

@@ -292,7 +292,7 @@ def test_the_snapshot_has_every_claim_that_the_code_makes(gathered):
     summary = json.loads((ROOT / "reports" / "snapshot" / "summary.json").read_text(encoding="utf-8"))
     held = {finding["id"] for finding in summary["findings"] if finding["kind"] == "regression"}
     made = {finding.id for finding in findings_of(gathered) if finding.kind == "regression"}
-    assert sorted(made - held) == []
+    assert sorted(made - held) == [], "renew the snapshot: python -m flipproof.cli.snapshot"
 
 
 def test_a_run_that_raises_becomes_its_reason():

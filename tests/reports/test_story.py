@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from flipproof.chapters.agreement.chapter import UP_TO
 from flipproof.frame.equations import NAMES
 from flipproof.page.glossary import TERMS, anchor, linked
 from flipproof.page.live import sliders
@@ -150,6 +151,15 @@ def test_a_summary_with_nothing_in_it_tells_no_numbers():
 def test_an_agreement_without_the_engines_is_not_told_as_theirs(names, told):
     found = story({"findings": [{"id": "agreement", "title": f"{names}: all agree", "value": 3e-4}]}, {})
     assert (found.n.agreement is not None) == told
+    assert (found.engines.count, found.engines.names) == ("two", "pymunk and MuJoCo")
+
+
+def test_an_agreement_before_the_end_of_the_flight_says_up_to_when():
+    title = "free-flight, solve_ivp, pymunk, mujoco: all agree within their bands"
+    for until in ("", "193 ms"):
+        words = f"{title}{UP_TO}{until}" if until else title
+        found = story({"findings": [{"id": "agreement", "title": words, "value": 3e-4}]}, {})
+        assert found.engines.until == until
 
 
 def test_sources_find_entries_and_say_when_there_are_none():

@@ -89,12 +89,8 @@ def test_each_is_held_against_its_own_equation():
         if rival.family == "engine":
             assert rival.equation == "free-flight"
         elif rival.family == "scheme":
-            expected = {
-                "published-python": "published-limit", "published-matlab": f"{OWN_LIMIT}published-matlab",
-                "paper-typeset": AT_REST, "signs-corrected": "signs-limit", "roots-corrected": "eq8-wall",
-                "exact-step": "eq8", "midpoint": "eq8",
-            }  # fmt: skip
-            assert rival.equation == expected[rival.name]
+            without_model = {"published-matlab": f"{OWN_LIMIT}published-matlab", "paper-typeset": AT_REST}
+            assert rival.equation == (SCHEMES[rival.name].model or without_model[rival.name])
 
 
 @pytest.mark.parametrize("effort", [FULL, QUICK], ids=["full", "quick"])
@@ -282,9 +278,8 @@ def test_a_price_in_seconds_steps_and_work():
 
 @pytest.mark.parametrize(
     ("name", "order"),
-    [*((scheme, 2.0 if scheme == "midpoint" else 1.0) for scheme in SCHEMES if scheme != "published-matlab"),
-     ("pymunk", 1.0)],
-)  # fmt: skip
+    [*((name, scheme.order) for name, scheme in SCHEMES.items() if name != "published-matlab"), ("pymunk", 1.0)],
+)
 def test_orders_before_the_first_impact(smooth, name, order):
     found = next(c for c in smooth[2].curves.values() if c.contender.name == name)
     assert found.failed == ()

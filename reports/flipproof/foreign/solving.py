@@ -31,6 +31,7 @@ from flipproof.foreign.specs import (
 from flipproof.frame import solvers
 from ode_reference.solver import WATERS
 from slicemodel import Scenario, Trajectory
+from slicemodel.schemes import SCHEMES
 from slicemodel.trajectory import FloatArray, output_times
 
 __all__ = ["Own", "check_spec", "is_spec", "opened", "solve"]
@@ -130,7 +131,7 @@ class Own(Runner):
         self.solver = solver
         # Column and rods are no equations of slices: they stand on no rung and declare none.
         equation = None if solver.name in WATERS else solver.name
-        order = 2.0 if solver.name == "midpoint" else 1.0
+        order = SCHEMES[solver.name].order if solver.name in SCHEMES else None
         declared: dict[str, dict[str, Any]] = {
             "slicemodel": {"equation": equation, "refined_by": "steps", "order": order},
             "ode_reference": {"equation": equation},

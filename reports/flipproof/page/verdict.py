@@ -26,6 +26,8 @@ from typing import Any, Final, Literal
 
 from markupsafe import Markup
 
+from engine_check.engines import ENGINES
+from flipproof.chapters.agreement.chapter import UP_TO
 from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL, Differences
 from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.chapters.finite_step.chapter import EVERYTHING, LOCATED, StepCosts
@@ -312,6 +314,9 @@ WATER: Final = {
 }
 """Name -> source of a plateau over omega_0."""
 
+COUNTED: Final[Mapping[int, str]] = {2: "two", 3: "three", 4: "four"}
+"""Numbers as words."""
+
 EXPERIMENTS: Final = {"minimum": "minimum", "change": "change-of-behaviour", "landing": "landing-angle"}
 
 
@@ -324,11 +329,18 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
     numbers = {name: summary.number(source, small) for name, source in SHARES.items()}
     numbers |= {name: summary.number(source, plain) for name, source in PLAIN.items()}
     numbers["threshold"] = summary.number("findings/paper-toppling-peak-geometry/value", _shown("{:.4f}"))
-    # The agreement on free flight counts as that of both engines; a quick report certifies neither.
-    if not all(engine in (summary.at("findings/agreement/title") or "") for engine in ("pymunk", "mujoco")):
+    # The agreement on free flight counts as that of the engines if all are there; a quick report certifies none.
+    title = summary.at("findings/agreement/title") or ""
+    if not all(engine in title for engine in ENGINES):
         numbers["agreement"] = None
+    engines = SimpleNamespace(
+        count=COUNTED.get(len(ENGINES), str(len(ENGINES))),
+        names=" and ".join(SPOKEN.get(engine, engine) for engine in ENGINES),
+        until=title.partition(UP_TO)[2],
+    )
     return SimpleNamespace(
         n=SimpleNamespace(**numbers),
+        engines=engines,
         layers=_layers(summary, numbers),
         shares=_bars(summary),
         experiments={name: _experiment(summary, id_) for name, id_ in EXPERIMENTS.items()},

@@ -26,7 +26,8 @@ def turns(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     line = ("turns", "Turns", "How far the bottle turns.", ("added.turns_chapter",))
-    monkeypatch.setattr(chapters, "CONTENTS", (chapters.CONTENTS[8], line))
+    ice = next(part for part in chapters.CONTENTS if part[0] == "ice")
+    monkeypatch.setattr(chapters, "CONTENTS", (ice, line))
 
 
 @pytest.mark.usefixtures("turns")
@@ -54,4 +55,4 @@ def test_an_added_chapter_can_be_checked():
     assert tuple(groups())[-2:] == ("turns", "thresholds")
     said = []
     assert not check(Scenario(n_slices=3), ("turns",), say=said.append).failed
-    assert said[0].startswith("PASS  turns: 0.778")
+    assert said[0].startswith("PASS  turns: 0.79")

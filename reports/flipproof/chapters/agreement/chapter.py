@@ -59,12 +59,16 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
-    """All pairs of several solvers up to a time [s]; ``words`` say which one stands alone, if one does."""
+    """All pairs of several solvers up to a time [s]; ``words`` say which one stands alone, if one does.
+
+    ``whole`` says whether that time is the end of the flight.
+    """
 
     names: tuple[str, ...]
     pairs: tuple[Pair, ...]
     until: float
     words: str
+    whole: bool
 
     def pair(self, a: str, b: str) -> Pair:
         """Return the pair of two different solvers, in either order."""
@@ -99,7 +103,13 @@ def study_agreement(
         # Written as "inside", because NaN fails every comparison: what is not a number is not within a band.
         share = float(np.mean(gap <= allowed))
         pairs.append(Pair(first=a, second=b, largest=float(gap.max()), bands=float(allowed.max()), share=share))
-    return Agreement(names=names, pairs=tuple(pairs), until=float(first.t[seen][-1]), words=_words(names, pairs))
+    return Agreement(
+        names=names,
+        pairs=tuple(pairs),
+        until=float(first.t[seen][-1]),
+        words=_words(names, pairs),
+        whole=bool(seen.all()),
+    )
 
 
 def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
@@ -187,9 +197,13 @@ def claims(results: Mapping[str, Agreement]) -> Claims:
         widest = max(agreement.pairs, key=lambda pair: pair.largest)
         pairs = [f"{p.first} and {p.second} {p.largest:.1e}, {100 * p.share:.0f} % within" for p in agreement.pairs]
         id_ = "agreement" if equation == FREE else f"agreement-{equation}"
-        title = f"{', '.join(agreement.names)}: {agreement.words}"
+        until = "" if agreement.whole else f"{UP_TO}{1e3 * agreement.until:.0f} ms"
+        title = f"{', '.join(agreement.names)}: {agreement.words}{until}"
         note = f"{'; '.join(pairs)}; up to {1e3 * agreement.until:.0f} ms"
         yield observed(id_, title, widest.largest, "of ω₀", note, band=Band(widest.bands, "twins and refinement"))
 
+
+UP_TO: Final = ", up to "
+"""What stands in the title before the horizon of the engines, if that is before the end of the flight."""
 
 CHAPTER: Final = Chapter("agreement", "One equation by several solvers", study, claims)
