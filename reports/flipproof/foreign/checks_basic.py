@@ -206,13 +206,22 @@ def check_ice(traits: Traits) -> Making:
         expected=f"{expected[worst]} within {bounds[worst]:.1g}",
         came=f"{worst} off by {off[worst].max():.2g}",
         where=f"scenario.frozen = True, {when(ask.times, off[worst])}",
-        advice="theta is off by whole turns: do not wrap it"
-        if wrapped
-        else "omega and the slices are right, theta alone is not: theta advances by omega dt over every step, also the "
-        "last one before a time asked; look at the clock, and at the inertia by which theta is advanced"
-        if worst == "theta"
-        else "hold every slice where it is when scenario.frozen is true",
+        advice=_of_ice(worst, wrapped, late=float(off["theta"][0]) <= bounds["theta"]),
         facts={"drift": float(off["omega"].max())},
+    )
+
+
+def _of_ice(worst: str, wrapped: bool, *, late: bool) -> str:
+    """Return what to look at if ice is wrong in one field: theta wrapped, or right at first and ``late`` wrong."""
+    if wrapped:
+        return "theta is off by whole turns: do not wrap it"
+    if worst != "theta":
+        return "hold every slice where it is when scenario.frozen is true"
+    if not late:
+        return "let theta go on from theta_0 when scenario.frozen is true"
+    return (
+        "omega and the slices are right, theta alone is not: theta advances by omega dt over every step, also the last "
+        "one before a time asked; look at the clock, and at the inertia by which theta is advanced"
     )
 
 
