@@ -46,9 +46,11 @@ def held() -> tuple[Held, ...]:
 
 def standing(statements: tuple[Held, ...]) -> str:
     """Return with how many statements either fluid agrees, in words."""
-    counts = [sum(each.readings[k].verdict == "holds" for each in statements) for k in range(len(NAMES))]
-    words = (f"{name} agrees with {count}" for name, count in zip(NAMES.values(), counts, strict=True))
-    return f"Of the {len(statements)} statements about water {', '.join(words)}."
+    without, held_together = (sum(each.readings[k].verdict == "holds" for each in statements) for k in range(2))
+    return (
+        f"Without suction our fluid agrees with {without} of the {len(statements)} statements about water, with suction "
+        f"with {held_together}."
+    )
 
 
 def flights(*, suction: bool) -> Flights:
