@@ -46,11 +46,9 @@ def held() -> tuple[Held, ...]:
 
 def standing(statements: tuple[Held, ...]) -> str:
     """Return with how many statements either fluid agrees, in words."""
-    without, held_together = (sum(each.readings[k].verdict == "holds" for each in statements) for k in range(2))
-    return (
-        f"Without suction our fluid agrees with {without} of the {len(statements)} statements about water, with suction "
-        f"with {held_together}."
-    )
+    without, sucked = (sum(each.readings[k].verdict == "holds" for each in statements) for k in range(2))
+    of = f"{without} of the {len(statements)} statements about water"
+    return f"Without suction our fluid agrees with {of}, with suction with {sucked}."
 
 
 def flights(*, suction: bool) -> Flights:
