@@ -18,7 +18,9 @@ from flipproof.cli.snapshot import BEGIN, END, PLACE, README, front_page, write_
 from flipproof.frame.solvers import FINER
 from flipproof.page.verdict import Headline, Measure, answer, headlines, lead, lines
 
-INSTEAD = "For slices, use free flight; for water, rods are the best guess."
+INSTEAD = (
+    "For slices, use free flight; for water, half full or more, rods (slices that cannot overlap) are the best guess."
+)
 
 PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
 
@@ -193,7 +195,7 @@ def test_nothing_is_said_of_ice_or_of_nothing():
         (
             0.005,
             0.55,
-            "Not as it stands: Eq. 8 is not free flight. The time steps are short enough. " + INSTEAD,
+            "Not as it stands: Eq. 8 is not free flight. The program’s time steps are short enough. " + INSTEAD,
         ),
         (0.01, 0.01, "On this throw the steps are short enough. Eq. 8 is free flight within 1 % of ω₀."),
         (0.02, 0.001, "On this throw the steps are too long. Eq. 8 is free flight within 1 % of ω₀."),
@@ -213,17 +215,24 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
         (
             0.42,
             "gravity in Eq. 8",
-            "Eq. 8 lets gravity slide water along the bottle, and the program’s formulas do not solve it.",
+            "Eq. 8 lets gravity slide water along the bottle, and the paper’s program does not solve it. "
+            "Its time steps are short enough.",
         ),
-        (0.42, "no recoil in impacts", "Eq. 8 is not free flight, and the program’s formulas do not solve it."),
-        (0.01, "gravity in Eq. 8", "Eq. 8 lets gravity slide water along the bottle."),
+        (
+            0.42,
+            "no recoil in impacts",
+            "Eq. 8 is not free flight, and the paper’s program does not solve it. Its time steps are short enough.",
+        ),
+        (
+            0.01,
+            "gravity in Eq. 8",
+            "Eq. 8 lets gravity slide water along the bottle. The program’s time steps are short enough.",
+        ),
     ],
 )
 def test_the_answer_names_the_algebra_and_the_weight_where_they_matter(algebra, largest, words):
     found = [made_up("step", 0.005), made_up("eq8-free", 0.55), made_up("program-eq8", algebra)]
-    assert answer([*found, made_up("pair", 0.55, what=largest)]) == (
-        f"Not as it stands: {words} The time steps are short enough. {INSTEAD}"
-    )
+    assert answer([*found, made_up("pair", 0.55, what=largest)]) == (f"Not as it stands: {words} {INSTEAD}")
 
 
 # ---------------------------------------------------------------------- the finite step
