@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -51,8 +51,9 @@ FLOWN = 257
 """Times of a flight at which a model of somebody else's is compared with its switches."""
 
 
+@cache
 def model_of(switches: Switches) -> Model:
-    """Return the model that ``switches`` make, under the name ``switches.name``."""
+    """Return the model that ``switches`` make, under the name ``switches.name``; equal switches make one model."""
     on = [field.name for field in fields(switches) if getattr(switches, field.name)]
     return Model(
         name=switches.name,

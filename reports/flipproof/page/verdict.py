@@ -31,7 +31,7 @@ from flipproof.chapters.agreement.chapter import UP_TO
 from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL, Differences
 from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.chapters.finite_step.chapter import EVERYTHING, LOCATED, StepCosts
-from flipproof.chapters.maps.study import RUNGS, place_of
+from flipproof.chapters.maps.study import RUNGS, SLICES, place_of
 from flipproof.chapters.solvers import FREE
 from flipproof.chapters.waterfall.study import STEP, Waterfall
 from flipproof.figures.spoken import SPOKEN
@@ -179,7 +179,8 @@ def answer(headlines: Sequence[Headline]) -> str:
     physics = "Eq. 8 lets gravity slide water along the bottle" if weight else "Eq. 8 is not free flight"
     owner = "The program’s" if solved else "Its"
     algebra = "" if solved else ", and the paper’s program does not solve it"
-    instead = "For slices, use free flight; for water, half full or more, rods (slices that cannot overlap) are the best guess."
+    water = "for water, half full or more, rods (slices that cannot overlap) are the best guess."
+    instead = f"For slices, use free flight; {water}"
     return {
         (True, False): f"Not as it stands: {physics}{algebra}. {owner} time steps are short enough. {instead}",
         (True, True): f"On this throw the steps are short enough. Eq. 8 is free flight within {within} of ω₀.",
@@ -429,7 +430,7 @@ def _map(table: str | None, content: Mapping[str, Any]) -> dict[str, Any] | None
     """Return the map over filling and damping for the script, from the CSV of its figure; None without one.
 
     ``thrown`` is the place of the report's throw on it and ``here`` the largest fair share in the cell next to it;
-    ``numbers`` are those of the assumptions in the figure.
+    ``numbers`` are those of the assumptions in the figure; ``slices`` those of every bottle on the map.
     """
     if not table:
         return None
@@ -448,6 +449,7 @@ def _map(table: str | None, content: Mapping[str, Any]) -> dict[str, Any] | None
         "fills": sorted({float(row[fill]) for row in rows}),
         "dampings": sorted({float(row[damping]) for row in rows}),
         "numbers": {name: k for k, name in enumerate(RUNGS, start=1)},
+        "slices": SLICES,
         "thrown": (x, y),
         "here": nearest.get("largest fair share", ""),
         "solvers": solvers,

@@ -23,6 +23,7 @@ from flipproof.chapters.maps.study import (
     LABELS,
     LADDER,
     RUNGS,
+    SLICES,
     Axis,
     ValidityMap,
     make_readings,
@@ -39,8 +40,6 @@ from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
 AXES: Final[Mapping[Axis, str]] = {"gamma": "damping", "step": "step size", "restitution": "restitution"}
-
-SLICES: Final = 50
 
 CHUNK: Final = 200
 """Runs of a map that a worker makes at a time; it returns their readings alone."""

@@ -65,6 +65,9 @@ LABELS: Final[Mapping[Axis, str]] = {
     "restitution": "restitution e [1]",
 }
 
+SLICES: Final = 50
+"""Slices of every bottle on a map."""
+
 POINTS: Final = 201
 """Output times of a model."""
 
