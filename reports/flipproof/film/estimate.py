@@ -49,6 +49,12 @@ NEGLIGIBLE: Final = 9.0
 EDGE: Final = 5.0
 """The same of a row at a grid's edge, beyond which the grid grows."""
 
+ENOUGH: Final = 40
+"""Cells that share the mass of the posterior, at the least, before they are cut no further."""
+
+DEEPEST: Final = 4
+"""Times that a cell is cut at the most."""
+
 DRAWS: Final = 8000
 """Sets of parameters drawn from the posterior."""
 
@@ -152,7 +158,7 @@ def estimate(
     """
     held = held or Held()
     known = throw.with_slices(slices or min(throw.n_slices, SLICES))
-    made = 0
+    made, began = 0, time.perf_counter()
 
     def count(flights: int) -> None:
         nonlocal made
@@ -163,11 +169,12 @@ def estimate(
     reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, x in starts) + 0.5  # the touch may turn out later
     equation = Equation(solver, known, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
     likelihood, x = starts[0] if len(starts) == 1 else _chosen(starts, equation)
-    likelihood, nodes, curves, fits, cell, complete = _grid(likelihood, equation, x, seconds)
-    levels = np.array([fit.evidence for fit in fits])
-    best = int(np.argmax(levels))
-    prior = np.arcsinh(MAX_RATE / SCALE)
-    draws = _draws(likelihood, nodes, fits, levels, cell)
+    likelihood, grid, complete = _closed_in(likelihood, equation, x, seconds)
+    if complete:
+        grid = _refined(likelihood, equation, grid, began + seconds)
+    fits, curves = grid.fits, grid.curves
+    best = int(np.argmax(grid.levels))
+    draws = _draws(likelihood, grid)
     times, costs, _ = _touches(likelihood, curves[best], fits[best].x)
     chance = np.exp(costs.min() - costs)
     rng = np.random.default_rng(1)
@@ -176,7 +183,7 @@ def estimate(
     likelihood = Likelihood(film, likelihood.held, likelihood.touch, likelihood.noise, likelihood.speed)
     return Estimate(
         film=film, throw=known, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
-        draws=draws, evidence=float(np.logaddexp.reduce(levels) + np.log(cell[0] * cell[1] / prior)),
+        draws=draws, evidence=float(np.logaddexp.reduce(grid.masses) - np.log(np.arcsinh(MAX_RATE / SCALE))),
         touched=bool(likelihood.touch < film.t[-1]), flights=made, complete=complete,
     )  # fmt: skip
 
@@ -192,18 +199,42 @@ def near_flight(film: Film, likelihood: Likelihood, release: float) -> Likelihoo
 # ---------------------------------------------------------------------- the grid over gamma and e
 
 
-def _grid(
-    likelihood: Likelihood, equation: Equation, x: FloatArray, seconds: float
-) -> tuple[Likelihood, FloatArray, list[Curve], list[Fit], tuple[float, float], bool]:
-    """Return the likelihood with its touch settled, the last grid's nodes, curves and fits, the size of a cell.
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """Cells over the coordinates of gamma / |omega_0| and e.
 
-    Last, whether the grid closed in on all that matters.
+    Parameters
+    ----------
+    nodes, cells : (C, 2) - middles of cells and their sizes
+    curves, fits : of each node
     """
+
+    nodes: FloatArray
+    cells: FloatArray
+    curves: list[Curve]
+    fits: list[Fit]
+
+    @property
+    def levels(self) -> FloatArray:
+        """Logarithm of the density of the data at every node, (C,)."""
+        return np.array([fit.evidence for fit in self.fits])
+
+    @property
+    def masses(self) -> FloatArray:
+        """Logarithm of its integral over every cell, (C,)."""
+        return np.asarray(self.levels + np.log(self.cells).sum(axis=1))
+
+
+def _closed_in(
+    likelihood: Likelihood, equation: Equation, x: FloatArray, seconds: float
+) -> tuple[Likelihood, Grid, bool]:
+    """Return the likelihood with its touch settled, the last grid, and whether it closed in on all that matters."""
     low, high = np.zeros(2), np.array([np.arcsinh(MAX_RATE / SCALE), 1.0])
     seeds, nearest = np.array([[np.nan, np.nan]]), [x]
     shape = COARSE
     film, began = likelihood.film, time.perf_counter()
-    for turn in range(16):
+    descended = False
+    for _ in range(16):
         cell = (high - low) / shape
         axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
         nodes = np.array(list(product(*axes)))
@@ -244,11 +275,12 @@ def _grid(
             # What matters is smaller than a cell: descents from several nodes say where it is. The first are from the
             # best of each row of e, across which one rebound more or less folds the likelihood.
             _, first = np.unique(nodes[order, 1], return_index=True)
-            for k in order[first] if turn == 0 else order[:3]:
+            for k in order[:3] if descended else order[first]:
                 more = _descent(likelihood, equation, nodes[k], fits[k].x, cell, (low, high))
                 nodes = np.concatenate((nodes, [one[0] for one in more]))
                 curves += [one[1] for one in more]
                 fits += [one[2] for one in more]
+            descended = True
             levels = np.array([fit.evidence for fit in fits])
             order = np.argsort(-levels)
             best, pad = int(order[0]), 0.3 * cell
@@ -259,7 +291,40 @@ def _grid(
         high = np.minimum(high, nodes[matters].max(axis=0) + pad)
         if np.prod((high - low) / wide) > 0.4:
             shape = FINE
-    return likelihood, nodes, curves, fits, (float(cell[0]), float(cell[1])), shape == FINE
+    return likelihood, Grid(nodes, np.broadcast_to(cell, nodes.shape), curves, fits), shape == FINE
+
+
+def _refined(likelihood: Likelihood, equation: Equation, grid: Grid, ends: float) -> Grid:
+    """Return the grid with cells that matter, and those beside them, cut in four until enough of them share the mass.
+
+    A ridge may be narrower than a cell, and lie across the grid. ``ends`` is when there is no time left to go on.
+    """
+    for _ in range(DEEPEST):
+        mass = np.exp(grid.masses - grid.masses.max())
+        if mass.sum() ** 2 / (mass**2).sum() > ENOUGH or time.perf_counter() > ends:
+            break
+        matters = grid.levels > grid.levels.max() - EDGE
+        apart = np.abs(grid.nodes[:, None] - grid.nodes[None, matters])
+        touching = apart < 0.51 * (grid.cells[:, None] + grid.cells[None, matters])
+        beside = np.any(np.all(touching, axis=2), axis=1)
+        whole, cut = np.flatnonzero(~beside), np.flatnonzero(beside)
+        quarters = np.array(list(product((-0.25, 0.25), repeat=2)))
+        nodes = (grid.nodes[cut, None] + quarters * grid.cells[cut, None]).reshape(-1, 2)
+        parents = [grid.fits[k].x for k in np.repeat(cut, 4)]
+        x = grid.fits[int(np.argmax(grid.levels))].x
+        tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
+        rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
+        flown = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
+        made = [k for k, curve in enumerate(flown) if curve is not None]
+        curves = [curve for curve in flown if curve is not None]
+        grid = Grid(
+            np.concatenate((grid.nodes[whole], nodes[made])),
+            np.concatenate((grid.cells[whole], np.repeat(grid.cells[cut] / 2, 4, axis=0)[made])),
+            [*(grid.curves[k] for k in whole), *curves],
+            [*(grid.fits[k] for k in whole),
+             *(likelihood.fitted(curve, parents[k]) for k, curve in zip(made, curves, strict=True))],
+        )  # fmt: skip
+    return grid
 
 
 def _grown(
@@ -326,14 +391,12 @@ def _descent(
     return seen
 
 
-def _draws(
-    likelihood: Likelihood, nodes: FloatArray, fits: list[Fit], levels: FloatArray, cell: tuple[float, float]
-) -> dict[str, FloatArray]:
+def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
     """Return draws of the posterior: a node, a place in its cell, and the other parameters given it."""
     rng = np.random.default_rng(0)
-    chance = np.exp(levels - levels.max())
-    picked = rng.choice(len(nodes), DRAWS, p=chance / chance.sum())
-    place = nodes[picked] + (rng.random((DRAWS, 2)) - 0.5) * cell
+    fits, chance = grid.fits, np.exp(grid.masses - grid.masses.max())
+    picked = rng.choice(len(fits), DRAWS, p=chance / chance.sum())
+    place = grid.nodes[picked] + (rng.random((DRAWS, 2)) - 0.5) * grid.cells[picked]
     inner = np.empty((DRAWS, len(fits[0].x)))
     for k in np.unique(picked):
         mine = picked == k
