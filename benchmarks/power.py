@@ -35,6 +35,7 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
     "fourth": patches("fourth"),
     "fifth": patches("fifth"),
     "sixth": patches("sixth"),
+    "seventh": patches("seventh"),
     "right": dict(RIGHT),
 }
 """Mistakes by list and name, and solvers without one."""
@@ -42,7 +43,8 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
 MISSED: Final = (
     "digits_swapped_in_tableau", "rests_without_giving_momentum", "hit_speed_of_the_end", "hits_split_by_tolerance",
     "no_restart_after_hit", "equal_step_weights", "support_lost_unseen", "adaptive_short_way_counts_as_ice",
-    "implicit_weak_drag_dropped", "reduced_free_body_keeps_released_slices",
+    "implicit_weak_drag_dropped", "reduced_free_body_keeps_released_slices", "adams_not_begun_again",
+    "lost_support_by_constant_force",
 )  # fmt: skip
 """Mistakes known to be missed."""
 

@@ -163,7 +163,8 @@ def command_place(options: argparse.Namespace) -> int:
             words = f"{options.spec} cannot be placed; it does not answer the throws that tell equations apart: {error}"
             print(inert(words, lines=False))
             return 1
-    print(json.dumps(found.to_mapping(), indent=1) if options.json else inert(found.text))
+    said = "; ".join(filter(None, (found.text, found.advice)))
+    print(json.dumps(found.to_mapping(), indent=1) if options.json else inert(said))
     return 0 if found.on_lattice else 1
 
 

@@ -505,6 +505,7 @@ def check_equation(traits: Traits) -> Making:
     own, hidden = found.change or 0.0, found.following_distance / 4
     weak = f"its own error, {own:.2g} of omega_0, is too large to tell equations apart" if own > hidden else ""
     advice = "" if holds and not strict else (yield from elsewhere.simplified(traits, declared))
+    advice = advice or (found.advice and f"{found.advice}; ")
     return Found(
         holds=holds and not strict,
         expected=declared,

@@ -105,8 +105,14 @@ class Place:
             return f"{self.solver} solves {nearest}; {following}{inert}"
         return (
             f"{self.solver} is off the lattice: the nearest equation is {nearest}, farther than its own error "
-            f"explains ({self.room:.2g}); {following}. Look for another restitution, drag or mass than the throw's"
+            f"explains ({self.room:.2g}); {following}"
         )
+
+    @property
+    def advice(self) -> str:
+        """What to do, where no more is known than the place; else nothing."""
+        lost = not (self.still or self.on_lattice)
+        return "look for another restitution, drag or mass than the throw's" if lost else ""
 
     def to_mapping(self) -> dict[str, object]:
         """Return the place as JSON-ready data."""

@@ -111,7 +111,7 @@ def test_a_film_that_was_once_read_wrongly_is_read_rightly(seed, options):
 
 
 def test_a_ridge_narrower_than_a_cell_is_resolved():
-    """The grid that closed in saw this film's ridge of gamma and e at one node; its interval of e left out the truth."""
+    """The grid that closed in saw this film's ridge of gamma and e at one node; the interval of e missed the truth."""
     rng = np.random.default_rng([6, 30001])
     truth = {"gamma": rng.uniform(2, 10), "e": rng.uniform(0.1, 0.8), "omega0": rng.uniform(14, 22)}
     made = film_simulator.film(rng, slices=6, fps=60, noise=0.5e-3, tilt=3.0, missing=3, **truth)

@@ -79,6 +79,7 @@ def test_wrong_constants_are_off_the_lattice(name):
     assert not found.on_lattice
     assert found.distance > 5 * found.room
     assert "off the lattice" in found.text
+    assert "restitution, drag or mass" in found.advice
 
 
 @pytest.mark.parametrize("name", ["RestitutionLow", "ElasticCap", "StickForEver"])
