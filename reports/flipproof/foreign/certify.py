@@ -258,7 +258,7 @@ def _result(name: str, check: Check, traits: Traits, asked: _Asked) -> Result:
 
 
 def _answered_without(asked: _Asked) -> str:
-    """Return without what the ask is answered that was not, of weight, drag and impacts, and what to look at.
+    """Return without what the ask is answered that was not, of rests, weight, drag and impacts, and what to look at.
 
     Asked once a solver, and only if it answers a throw without any of them.
     """
@@ -269,25 +269,29 @@ def _answered_without(asked: _Asked) -> str:
     throw = ask.scenario
     share = min(1.0, 1.0 / (abs(throw.omega0) * throw.duration))  # a radian, before most impacts
     short = replace(ask, scenario=replace(throw, duration=share * throw.duration), times=share * ask.times)
-    simpler = {
-        "": replace(short, scenario=replace(short.scenario, gravity=0.0, drag=0.0)),
-        "weight": replace(ask, scenario=replace(throw, gravity=0.0)),
-        "drag": replace(ask, scenario=replace(throw, drag=0.0)),
-        "impacts": short,
-    }
-    for name, one in simpler.items():
+    bare = replace(short, scenario=replace(short.scenario, gravity=0.0, drag=0.0))
+    middle = np.linspace(0.55, 0.45, throw.n_slices) * throw.bottle.length
+
+    def answered(one: Ask) -> bool:
         try:
             asked(one)
-        except WaitingError:
-            return ""
         except ForeignError:
-            if not name:
-                return ""
-        else:
-            if name:
-                when = "up to the first impact" if name == "impacts" else f"without {name}"
-                return f"; the same is answered {when}: look at {elsewhere.LOOK_AT[name]}"
-    return ""
+            return False
+        return True
+
+    if not answered(bare):
+        words, name = "with every slice far from the ends", "rests"
+        if not answered(replace(bare, start=middle)):
+            return ""
+    elif answered(replace(ask, scenario=replace(throw, gravity=0.0))):
+        words, name = "without weight", "weight"
+    elif answered(replace(ask, scenario=replace(throw, drag=0.0))):
+        words, name = "without drag", "drag"
+    elif answered(short):
+        words, name = "up to the first impact", "impacts"
+    else:
+        return ""
+    return f"; the same is answered {words}: look at {elsewhere.LOOK_AT[name]}"
 
 
 def _enough(results: Iterable[Result]) -> Result:

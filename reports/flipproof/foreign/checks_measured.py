@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.curves.order import observed_order
+from flipproof.foreign import elsewhere
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.place import curve, placing
@@ -96,6 +97,10 @@ def check_refinement(traits: Traits) -> Making:
     came = f"changes of {', '.join(f'{c:.2g}' for c in changes)} of omega_0 from level to level"
     if not moved:
         came = f"the same answer to the last bit at {len(levels)} levels of {traits.refined_by}"
+    advice = f"use ask.effort as {traits.refined_by}, or declare no refined_by"
+    if not moved and not holds and traits.equation and (yield from placing(traits)).equation == traits.equation:
+        why = yield from elsewhere.simplified(traits, traits.equation)
+        advice = f"{why}{advice}" if why.startswith("right") else advice
     if not holds:
         came += ": steps grow no shorter, ask.effort is ignored from there on" if moved else ": ask.effort is ignored"
     return Found(
@@ -103,7 +108,7 @@ def check_refinement(traits: Traits) -> Making:
         expected=f"an answer that changes with {traits.refined_by}",
         came=came,
         where="0.3 s with impacts",
-        advice=f"use ask.effort as {traits.refined_by}, or declare no refined_by",
+        advice=advice,
         weak=weak,
     )
 

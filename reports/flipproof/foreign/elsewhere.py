@@ -101,6 +101,8 @@ class Knobs:
             start = np.roll(rng.permutation(start), 1) if self.slices > 2 else start[::-1].copy()
         elif self.start == "scattered" and self.slices == 1:
             start = np.array([throw.r_min + 0.3 * (throw.r_max - throw.r_min)])  # in the middle nothing pulls it
+        elif self.start == "in the middle":
+            start = np.linspace(0.6, 0.4, self.slices) * throw.bottle.length
         elif self.start != "stacked":
             start = rng.uniform(throw.r_min, throw.r_max, self.slices)
             if self.start == "partly on the ends":
@@ -312,8 +314,8 @@ class Judged:
     """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
 
     ``own`` is the solver's own error of omega where it was judged, ``error`` says why there is no answer, ``since``
-    up to which impact it is right, ``passed`` how many impacts that are, and ``alone`` which slice is the first to be
-    wrong, if it is a single one.
+    up to which impact it is right, ``passed`` how many impacts that are, ``alone`` which slice is the first to be
+    wrong, if it is a single one, and ``astray`` the slices that are then farthest off, within a factor of five.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
@@ -324,6 +326,7 @@ class Judged:
     since: str = ""
     passed: int = 0
     alone: str = ""
+    astray: tuple[int, ...] = ()
 
     @property
     def farthest(self) -> float:
@@ -362,6 +365,7 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
     clear = rooms["omega"] <= BLURRED
     wrong: dict[str, tuple[float, float, float]] = {}
     first, alone = float(ask.times[-1]), ""
+    astray: tuple[int, ...] = ()
     for name in given:
         off = sizes(mine, truth, name)[clear]
         room = rooms[name][clear]
@@ -377,8 +381,9 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
             wrong[name] = float(rows[k]), float(room[k]), float(ask.times[k])
             row = int(np.argmax(rows > room))
             first = min(first, float(ask.times[:reached][clear][row]))
-            if name == "r" and ask.scenario.n_slices > 1 and np.count_nonzero(off[row] > room[row]) == 1:
-                alone = f", slice {int(np.argmax(off[row]))} alone"
+            if name == "r" and ask.scenario.n_slices > 1:
+                astray = tuple(np.flatnonzero(off[row] > max(room[row], off[row].max() / 5)).tolist())
+                alone = f", slice {astray[0]} alone" if np.count_nonzero(off[row] > room[row]) == 1 else ""
     if mine.impacts is not None and clear.any():
         room_of_r = rooms.get("r", rooms["omega"])[clear]
         if late := _unmatched(ask, mine.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]):
@@ -392,6 +397,7 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         since=since,
         passed=passed,
         alone=alone,
+        astray=astray,
     )
 
 
@@ -645,10 +651,15 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
             return f"{right_without(name)}{since}"
     if "all" in right:
         return f"right without weight, drag and impacts, and wrong without any single one of them; {since}"
-    return (
-        "wrong before the first impact without weight and drag, too: look at the centrifugal term omega^2 (r - r_cm), "
-        "the inertia and the masses; "
-    )
+    too = "wrong before the first impact without weight and drag, too"
+    (apart,) = yield from judging(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
+    if not apart.wrong:
+        return f"{too}, but right with every slice far from the ends: look at the places of the ends, and at rests; "
+    astray = others[-1].astray
+    if 0 < len(astray) < whole.slices:
+        which = f"slice {', '.join(map(str, astray))} first"
+        return f"{too}, {which}: look at what is done to it alone, as by a loop over slices that misses one; "
+    return f"{too}: look at the centrifugal term omega^2 (r - r_cm), the inertia and the masses; "
 
 
 def _wrong_words(judged: Judged) -> str:

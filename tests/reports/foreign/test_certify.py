@@ -572,13 +572,33 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("halving_drag_of_momentum", "angular-momentum", "right without drag: look at the drag"),
         ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
         ("halving_released_level", "mirror", "right without weight: look at the weight"),
+        ("at_most_two_hundred_steps", "times", "right where outputs lie close: look at what goes on between two"),
+        ("last_slice_forgotten", "equation", "slice 3 first: look at what is done to it alone"),
     ],
 )
 def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    solver = (patches("first") | patches("second") | patches("fifth"))[mistake].solver()
+    solver = (patches("first") | patches("second") | patches("fifth") | patches("seventh"))[mistake].solver()
     found = certify(InProcess(solver, mistake), until_failed=True)
     assert [r.check for r in found.failed] == [check]
     assert advice in found.results[-1].line
+
+
+def test_effort_without_effect_is_traced_to_what_is_wrong():
+    solver = patches("seventh")["rest_from_a_fiftieth"].solver()
+    (refinement,) = certify(InProcess(solver, "x"), ["refinement"]).results
+    assert refinement.verdict == FAILED
+    assert "right through impacts as long as no slice rests: look at rests" in refinement.line
+
+
+def test_what_is_answered_far_from_the_ends_alone_points_to_rests():
+    class Stuck(Subject):
+        def solve(self, ask):
+            if np.max(ask.start) > 0.9 * ask.scenario.bottle.length:
+                raise ForeignError("the step became too small")
+            return super().solve(ask)
+
+    (shape,) = certify(InProcess(Stuck(), "x"), ["shape"]).results
+    assert "the same is answered with every slice far from the ends: look at rests" in shape.line
 
 
 @pytest.mark.parametrize(
