@@ -215,13 +215,14 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
         (
             0.42,
             "gravity in Eq. 8",
-            "Eq. 8 lets gravity slide water along the bottle, and the paper’s program does not solve it. "
-            "Its time steps are short enough.",
+            "Eq. 8 lets gravity slide water along the bottle, and the formulas of the paper’s program do not solve it. "
+            "The program’s time steps are short enough.",
         ),
         (
             0.42,
             "no recoil in impacts",
-            "Eq. 8 is not free flight, and the paper’s program does not solve it. Its time steps are short enough.",
+            "Eq. 8 is not free flight, and the formulas of the paper’s program do not solve it. "
+            "The program’s time steps are short enough.",
         ),
         (
             0.01,

@@ -103,7 +103,8 @@
         pen.fillText(NAMES[solver], left + 8, 16);
         pen.font = `12px ${getComputedStyle(canvas).fontFamily}`;
         pen.fillStyle = style("--soft");
-        const spin = `spin: ${(100 * flown.omega[frame] / thrown.omega0).toFixed(0)} %`, whole = `${spin} of the initial spin`;
+        const share = `${(100 * flown.omega[frame] / thrown.omega0).toFixed(0)} %`, time = `${(fixed.duration * frame / (FRAMES - 1)).toFixed(2)} s`;
+        const spin = `${time}: spin ${share}`, whole = `${spin} of the initial spin`;
         pen.fillText(pen.measureText(whole).width < wide - 22 ? whole : spin, left + 8, height - 6);
       });
     }
@@ -125,7 +126,7 @@
       if (slider) said.textContent = now.map((_, j) => `${NAMES[solvers[j]]}: ω moves by up to ${percent(moved[j])} of ω₀.`).join(" ");
       else said.textContent = thrown.g
         ? root.dataset.asked
-        : `Gravity is off (grey: on). This moves the spin of Eq. 8 by up to ${percent(moved[0])} of the initial spin, that of free flight by ${percent(moved[1])}. Gravity makes bottle and water fall together: it cannot move one against the other.`;
+        : `Gravity is off (grey: on). This moves the spin of Eq. 8 by up to ${percent(moved[0])} of the initial spin, that of free flight by ${percent(moved[1])}. Gravity makes bottle and water fall together: in flight it cannot move one against the other.`;
       root.dataset.moved = moved.map((share) => share.toPrecision(6)).join(" ");
     }
     function set(change) {
