@@ -36,6 +36,7 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
     "fifth": patches("fifth"),
     "sixth": patches("sixth"),
     "seventh": patches("seventh"),
+    "eighth": patches("eighth"),
     "right": dict(RIGHT),
 }
 """Mistakes by list and name, and solvers without one."""

@@ -590,6 +590,13 @@ def test_effort_without_effect_is_traced_to_what_is_wrong():
     assert "right through impacts as long as no slice rests: look at rests" in refinement.line
 
 
+def test_what_is_kept_under_a_throw_shows_when_it_starts_from_other_places():
+    solver = patches("eighth")["closed_form_momentum_remembered"].solver()
+    (start,) = certify(InProcess(solver, "x"), ["start"]).results
+    assert start.verdict == FAILED
+    assert "nothing is kept under the throw" in start.line
+
+
 def test_what_is_answered_far_from_the_ends_alone_points_to_rests():
     class Stuck(Subject):
         def solve(self, ask):
