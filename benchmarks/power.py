@@ -45,7 +45,8 @@ MISSED: Final = (
     "digits_swapped_in_tableau", "rests_without_giving_momentum", "hit_speed_of_the_end", "hits_split_by_tolerance",
     "no_restart_after_hit", "equal_step_weights", "support_lost_unseen", "adaptive_short_way_counts_as_ice",
     "implicit_weak_drag_dropped", "reduced_free_body_keeps_released_slices", "adams_not_begun_again",
-    "lost_support_by_constant_force",
+    "lost_support_by_constant_force", "adaptive_a_millimetre_is_no_room", "six_decimals_for_six_digits",
+    "reduced_free_slow_spin_not_scaled",
 )  # fmt: skip
 """Mistakes known to be missed."""
 

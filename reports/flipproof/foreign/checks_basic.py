@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -183,26 +183,34 @@ def check_times(traits: Traits) -> Making:
             off, room = went, np.full(4, least)
             came = f"theta advances by {went.max():.2g} rad more or less than omega says"
             where = f"between two times that are {apart:.2g} s apart"
+    holds = bool(np.all(off <= room))
+    advice = "" if holds else (yield from _of_outputs(traits, one, other.omega[common]))
     return Found(
-        holds=bool(np.all(off <= room)),
+        holds=holds,
         expected=f"the same within {room.max():.1g}, its own error",
         came=came,
         where=f"{where}, {when(few, off)}",
-        advice=f"{_of_outputs(traits, one, other, common)}the flight begins at t = 0, also if that is not asked; "
+        advice=f"{advice}the flight begins at t = 0, also if that is not asked; "
         "go exactly to each of ask.times, uneven as they are: cut the last step short, and leave nothing out",
         facts={"times": float(off.max())},
     )
 
 
-def _of_outputs(traits: Traits, few: Answer, many: Answer, common: np.ndarray[Any, np.dtype[np.intp]]) -> str:
-    """Return what to look at if omega is right at many output times and wrong at few, by the declared equation."""
+def _of_outputs(traits: Traits, few: Answer, often: FloatArray) -> elsewhere.Asking:
+    """Return what to look at if omega is right where it is asked ``often`` and wrong at few times."""
     try:
-        truth = curve(name_of(switches_of(traits.equation or "")), SMOOTH, few.t).omega
+        equation = name_of(switches_of(traits.equation or ""))
     except ValueError:
         return ""
-    far, near = (float(np.max(np.abs(omega - truth))) for omega in (few.omega, many.omega[common]))
+    simpler = {"weight": replace(SMOOTH, gravity=0.0), "drag": replace(SMOOTH, drag=0.0)}
+    right = curve(equation, SMOOTH, few.t).omega
+    far, near = (float(np.max(np.abs(omega - right))) for omega in (few.omega, often))
     if far < 4 * near:
         return ""
+    answers = yield [replace(ask_of(traits, throw), times=few.t) for throw in simpler.values()]
+    for (name, throw), answer in zip(simpler.items(), answers, strict=True):
+        if np.max(np.abs(answer.omega - curve(equation, throw, few.t).omega)) < far / 10:
+            return f"right where outputs lie close, and {elsewhere.right_without(name)}"
     return "right where outputs lie close: look at what goes on between two of them, such as J, omega and theta; "
 
 

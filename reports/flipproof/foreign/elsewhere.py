@@ -568,8 +568,9 @@ def bisected(
     paper, ice = replace(PAPER, frozen=knobs.frozen), "in ice " if knobs.frozen else ""
     (base,) = yield from how([paper])
     if base.wrong:
-        without = "" if knobs.frozen else (yield from simplified(traits, equation, unrefined))
-        return f"{ice}{_wrong_words(base)} on the paper's throw, too", f"{without}{_field_advice(base)}"
+        fields = _field_advice(base)
+        without = "" if knobs.frozen or fields else (yield from simplified(traits, equation, unrefined))
+        return f"{ice}{_wrong_words(base)} on the paper's throw, too", f"{without}{fields}"
     single = [_shortened(replace(paper, **{name: getattr(knobs, name)}), seed, FEW_IMPACTS) for name in names]
     turned = sorted(zip(names, single, (yield from how(single)), strict=True), key=lambda one: -one[2].excess)
     for name, throw, first in turned:
@@ -643,6 +644,8 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
     if {"weight", "impacts"} <= right:
         if "rests" in right:
             return f"right without weight, and without rests: look at {LOOK_AT['rests']}; {since}"
+        if first.passed:
+            return f"right without weight, and through some impacts: look at rests and at {LOOK_AT['impacts']}; {since}"
         return f"right without weight, and before half a turn: look at {LOOK_AT['weight']}, at every angle; {since}"
     if {"rests", "impacts"} <= right:
         return f"right through impacts as long as no slice rests: look at {LOOK_AT['rests']}; {since}"
@@ -689,8 +692,8 @@ def _impact_advice(judged: Judged) -> str:
 
 
 def _field_advice(judged: Judged, before: str = "") -> str:
-    """Return what to look at by the fields that are wrong, if omega is right and no impact was."""
-    if judged.error or "omega" in judged.wrong or judged.passed:
+    """Return what to look at by the fields that are wrong, if omega is right: through impacts not by a small error."""
+    if judged.error or "omega" in judged.wrong or (judged.passed and judged.farthest < FAINT / 4):
         return ""
     only = ", ".join(judged.wrong)
     return f"{before}omega is right, {only} not: look at how the answer is put together"
