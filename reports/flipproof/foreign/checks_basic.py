@@ -57,7 +57,7 @@ def check_start(traits: Traits) -> Making:
             break
     late = (answer.theta[0] - throw.theta0) / throw.omega0
     drifted = worst == "theta" and bound < late < 0.02  # a step or two; answers may belong to other times
-    kept = ask is asks[-1] and worst == "omega"
+    kept = ask is asks[-1] and (worst == "omega" or np.array_equal(answer.omega, answers[0].omega))
     sloped = worst == "omega" and not kept and bound < off[worst] < 0.05
     hint = _of_places(ask, answer) if worst == "r" and answer.r is not None else ""
     return Found(
