@@ -18,9 +18,7 @@ from flipproof.cli.snapshot import BEGIN, END, PLACE, README, front_page, write_
 from flipproof.frame.solvers import FINER
 from flipproof.page.verdict import Headline, Measure, answer, headlines, lead, lines
 
-INSTEAD = (
-    "For slices, use free flight; for water, half full or more, rods (slices that cannot overlap) are the best guess."
-)
+INSTEAD = "For slices, use free flight; for water, half full or more, rods (slices without overlap) are the best guess."
 
 PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
 
@@ -215,14 +213,14 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
         (
             0.42,
             "gravity in Eq. 8",
-            "Eq. 8 lets gravity slide water along the bottle, and the formulas of the paper’s program do not solve it. "
-            "The program’s time steps are short enough.",
+            "Eq. 8 lets gravity slide water along the bottle, and the program’s formulas do not solve it, "
+            "though its time steps are short enough.",
         ),
         (
             0.42,
             "no recoil in impacts",
-            "Eq. 8 is not free flight, and the formulas of the paper’s program do not solve it. "
-            "The program’s time steps are short enough.",
+            "Eq. 8 is not free flight, and the program’s formulas do not solve it, "
+            "though its time steps are short enough.",
         ),
         (
             0.01,
