@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
@@ -275,23 +276,24 @@ def _answered_without(asked: _Asked) -> str:
     def answered(one: Ask) -> bool:
         try:
             asked(one)
+        except WaitingError:
+            raise
         except ForeignError:
             return False
         return True
 
-    if not answered(bare):
-        words, name = "with every slice far from the ends", "rests"
-        if not answered(replace(bare, start=middle)):
-            return ""
-    elif answered(replace(ask, scenario=replace(throw, gravity=0.0))):
-        words, name = "without weight", "weight"
-    elif answered(replace(ask, scenario=replace(throw, drag=0.0))):
-        words, name = "without drag", "drag"
-    elif answered(short):
-        words, name = "up to the first impact", "impacts"
-    else:
-        return ""
-    return f"; the same is answered {words}: look at {elsewhere.LOOK_AT[name]}"
+    words, name = "", ""
+    with suppress(WaitingError):
+        if not answered(bare):
+            if answered(replace(bare, start=middle)):
+                words, name = "with every slice far from the ends", "rests"
+        elif answered(replace(ask, scenario=replace(throw, gravity=0.0))):
+            words, name = "without weight", "weight"
+        elif answered(replace(ask, scenario=replace(throw, drag=0.0))):
+            words, name = "without drag", "drag"
+        elif answered(short):
+            words, name = "up to the first impact", "impacts"
+    return name and f"; the same is answered {words}: look at {elsewhere.LOOK_AT[name]}"
 
 
 def _enough(results: Iterable[Result]) -> Result:
