@@ -177,11 +177,12 @@ def answer(headlines: Sequence[Headline]) -> str:
     weight = "pair" in by_id and by_id["pair"].what == RUNG_NAMES["weightless"]
     solved = "program-eq8" not in by_id or by_id["program-eq8"].value <= PARTING_BAND
     physics = "Eq. 8 lets gravity slide water along the bottle" if weight else "Eq. 8 is not free flight"
-    program = ". The program’s" if solved else ", and the paper’s program solves another equation, though its"
+    other = "the paper’s program solves another equation, though in short enough time steps"
+    program = ". The program’s time steps are short enough" if solved else f", and {other}"
     water = "for water, half full or more, rods (slices without overlap) are the best guess."
     instead = f"For slices, use free flight; {water}"
     return {
-        (True, False): f"Not as it stands: {physics}{program} time steps are short enough. {instead}",
+        (True, False): f"Not as it stands: {physics}{program}. {instead}",
         (True, True): f"On this throw the steps are short enough. Eq. 8 is free flight within {within} of ω₀.",
         (False, True): f"On this throw the steps are too long. Eq. 8 is free flight within {within} of ω₀.",
         (False, False): f"On this throw the steps are too long, and Eq. 8 is not free flight. {instead}",
