@@ -563,7 +563,6 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("flight_ends_at_half_a_second", "angle", "fly to the last of ask.times"),
         ("rest_of_step_lost", "angle", "over the rest of a step"),
         ("answers_cached_without_start", "start", "nothing is kept under the throw"),
-        ("closed_form_momentum_remembered", "start", "J_0 is that of ask.start"),
         ("restitution_hardcoded", "inputs", "with another restitution"),
         ("tolerance_of_the_module", "refinement", "or declare no refined_by"),
         ("adaptive_cap_rebound_put_on_base", "angle", "look at where an impact or the end of a rest puts a slice"),
@@ -573,23 +572,31 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("halving_drag_of_momentum", "angular-momentum", "right without drag: look at the drag"),
         ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
         ("halving_released_level", "mirror", "right without weight: look at the weight"),
+    ],
+)
+def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, advice):
+    solver = (patches("first") | patches("second") | patches("fifth"))[mistake].solver()
+    found = certify(InProcess(solver, mistake), until_failed=True)
+    assert [r.check for r in found.failed] == [check]
+    assert advice in found.results[-1].line
+
+
+@pytest.mark.parametrize(
+    ("mistake", "check", "advice"),
+    [
+        ("answers_cached_without_start", "inputs", "keep no answer under a part of the question"),
+        ("closed_form_momentum_remembered", "start", "J_0 is that of ask.start"),
         ("at_most_two_hundred_steps", "times", "right where outputs lie close: look at what goes on between two"),
+        ("rest_from_a_fiftieth", "refinement", "right through impacts as long as no slice rests: look at rests"),
         ("last_slice_forgotten", "equation", "slice 3 first: look at what is done to it alone"),
     ],
 )
-def test_the_check_that_fails_advises_to_look_where_the_mistake_is(mistake, check, advice):
+def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, advice):
     lists = ("first", "second", "fifth", "seventh", "eighth")
     solver = next(each[mistake] for each in map(patches, lists) if mistake in each).solver()
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
     assert advice in result.line
-
-
-def test_effort_without_effect_is_traced_to_what_is_wrong():
-    solver = patches("seventh")["rest_from_a_fiftieth"].solver()
-    (refinement,) = certify(InProcess(solver, "x"), ["refinement"]).results
-    assert refinement.verdict == FAILED
-    assert "right through impacts as long as no slice rests: look at rests" in refinement.line
 
 
 def test_what_is_answered_far_from_the_ends_alone_points_to_rests():
