@@ -271,7 +271,6 @@ def _answered_without(asked: _Asked) -> str:
     share = min(1.0, 1.0 / (abs(throw.omega0) * throw.duration))  # a radian, before most impacts
     short = replace(ask, scenario=replace(throw, duration=share * throw.duration), times=share * ask.times)
     bare = replace(short, scenario=replace(short.scenario, gravity=0.0, drag=0.0))
-    middle = np.linspace(0.55, 0.45, throw.n_slices) * throw.bottle.length
 
     def answered(one: Ask) -> bool:
         try:
@@ -285,7 +284,7 @@ def _answered_without(asked: _Asked) -> str:
     words, name = "", ""
     with suppress(WaitingError):
         if not answered(bare):
-            if answered(replace(bare, start=middle)):
+            if answered(replace(bare, start=elsewhere.far_from_ends(throw))):
                 words, name = "with every slice far from the ends", "rests"
         elif answered(replace(ask, scenario=replace(throw, gravity=0.0))):
             words, name = "without weight", "weight"

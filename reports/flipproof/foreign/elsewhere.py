@@ -102,7 +102,7 @@ class Knobs:
         elif self.start == "scattered" and self.slices == 1:
             start = np.array([throw.r_min + 0.3 * (throw.r_max - throw.r_min)])  # in the middle nothing pulls it
         elif self.start == "in the middle":
-            start = np.linspace(0.6, 0.4, self.slices) * throw.bottle.length
+            start = far_from_ends(throw)
         elif self.start != "stacked":
             start = rng.uniform(throw.r_min, throw.r_max, self.slices)
             if self.start == "partly on the ends":
@@ -121,6 +121,11 @@ class Knobs:
         for array in (start, times):
             array.setflags(write=False)
         return Ask(scenario=throw, times=times, start=start)
+
+
+def far_from_ends(throw: Scenario) -> FloatArray:
+    """Return places in the middle fifth of the bottle, shape (N,) [m], the first slice nearest to the base."""
+    return np.linspace(0.6, 0.4, throw.n_slices) * throw.bottle.length
 
 
 PAPER: Final = Knobs()
@@ -658,7 +663,7 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
     (apart,) = yield from judging(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
     if not apart.wrong:
         return f"{too}, but right with every slice far from the ends: look at the places of the ends, and at rests; "
-    astray = others[-1].astray
+    astray = dict(zip(simpler, others, strict=True))["all"].astray
     if 0 < len(astray) < whole.slices:
         which = f"slice {', '.join(map(str, astray))} first"
         return f"{too}, {which}: look at what is done to it alone, as by a loop over slices that misses one; "
