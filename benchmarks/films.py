@@ -3,6 +3,7 @@
     python benchmarks/films.py [--films 20] [--first 0] [--slices 6]      coverage, one line a cell
     python benchmarks/films.py --spoiled 500 --noise 200                  spoiled and random films: no traceback
     python benchmarks/films.py --late 20                                  late releases, seen without an equation
+    python benchmarks/films.py --given 5          widths of intervals, over those with the true release given
 
 Frames per second and noise of a click, three levels each, are crossed; tilt, bad clicks, missing points and filling run
 through their levels by an orthogonal fraction of 18 cells.
@@ -26,7 +27,7 @@ from scipy.stats import beta
 from flipproof.film.estimate import estimate
 from flipproof.film.fall import before
 from flipproof.film.judge import Judged
-from flipproof.film.likelihood import Film
+from flipproof.film.likelihood import Film, Held
 from slicemodel import Scenario
 
 NAMES = ("gamma", "omega0", "release", "tilt", "restitution")
@@ -119,6 +120,28 @@ def rough(spoiled: int, noise: int, slices: int) -> None:
     print(dict(outcome))
 
 
+def widths(films: int, first: int, slices: int) -> None:
+    """Print by cell how wide intervals are, over those with the true release given: median, largest, number."""
+    for index, cell in enumerate(cells()):
+        ratios: dict[str, list[float]] = {name: [] for name in NAMES if name != "release"}
+        for k in range(first, first + films):
+            made = drawn(np.random.default_rng([index, k]), cell, slices)
+            film, throw = film_of(made), Scenario(water_mass=cell["filling"]).with_slices(slices)
+            try:
+                alone = Judged(estimate(film, throw))
+                given = Judged(estimate(film, throw, held=Held(release=made.truth["release"])))
+                alone.check()
+            except ValueError as error:
+                print("   refused:", error, flush=True)
+                continue
+            for name, found in ratios.items():
+                if name != "restitution" or alone.verdict(name) != "cannot tell":
+                    wide, narrow = (float(np.ptp(one.estimate.interval(name))) for one in (alone, given))
+                    found.append(wide / narrow)
+        words = [f"{name} {np.median(v):.2f}, {max(v):.2f} of {len(v)}" for name, v in ratios.items() if v]
+        print(*cell.values(), "|", "; ".join(words), flush=True)
+
+
 def releases(films: int) -> None:
     """Print how many late releases are seen without an equation; 0 ms is the truth."""
     for fps, late in product((30, 60, 240), (0, 40, 80, 150)):
@@ -135,12 +158,14 @@ def releases(films: int) -> None:
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parent))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("films", 20), ("first", 0), ("slices", 6), ("spoiled", 0), ("noise", 0), ("late", 0)):
-        parser.add_argument(f"--{name}", type=int, default=default)
+    for name in ("films", "first", "slices", "spoiled", "noise", "late", "given"):
+        parser.add_argument(f"--{name}", type=int, default={"films": 20, "slices": 6}.get(name, 0))
     parser.add_argument("--fps", type=int, nargs="*", default=[], help="cells of these frame rates alone")
     options = parser.parse_args()
     if options.late:
         releases(options.late)
+    elif options.given:
+        widths(options.given, options.first, options.slices)
     elif options.spoiled or options.noise:
         rough(options.spoiled, options.noise, options.slices)
     else:
