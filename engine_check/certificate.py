@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from engine_check.engines import ENGINES, checked_number
-from engine_check.refinement import BENT, DOUBLE, EARLIER, MOVED, SHAKEN, Level, Runs, Verdict, search
+from engine_check.refinement import BENT, DOUBLE, EARLIER, MOVED, SHAKEN, Level, Runs, Trial, search
 from engine_check.restitution import Rebound, measure_restitution
 from slicemodel.scenario import Scenario, not_whole
 from slicemodel.trajectory import FloatArray, Trajectory, output_times
@@ -265,7 +265,7 @@ def certified(scenario: Scenario, engine: str, **settings: Any) -> Trajectory:
     )
 
 
-def _observed_order(runs: Runs, at: Verdict) -> tuple[float, str]:
+def _observed_order(runs: Runs, at: Trial) -> tuple[float, str]:
     """Return the order of the mean changes of 4h, 2h, h, or NaN and why."""
     coarsest, coarse, run = (runs.known(at.dt * factor, at.iterations) for factor in (4.0, 2.0, 1.0))
     if coarsest is None or coarse is None or run is None:
@@ -280,14 +280,14 @@ def _observed_order(runs: Runs, at: Verdict) -> tuple[float, str]:
     return order, ""
 
 
-def _extrapolated(runs: Runs, at: Verdict, run: Trajectory, order: int) -> FloatArray:
+def _extrapolated(runs: Runs, at: Trial, run: Trajectory, order: int) -> FloatArray:
     coarse = runs.known(2 * at.dt, at.iterations)
     if coarse is None or not run.ok:
         return np.full(len(run.t), np.nan)
     return np.asarray(run.omega + (run.omega - coarse.omega) / (2**order - 1))
 
 
-def _band(runs: Runs, at: Verdict, run: Trajectory, order: float) -> tuple[FloatArray, str]:
+def _band(runs: Runs, at: Trial, run: Trajectory, order: float) -> tuple[FloatArray, str]:
     """Return the band, and why there is none or why it is wide; an empty string if neither."""
     coarsest, coarse = (runs.known(at.dt * factor, at.iterations) for factor in (4.0, 2.0))
     bent = runs.bent(2 * at.dt, at.iterations)

@@ -21,7 +21,7 @@ import numpy as np
 from engine_check import watch
 from engine_check.engines import Order
 from engine_check.mujoco_settings import DISABLED, MujocoKnobs
-from engine_check.watch import Band, State
+from engine_check.watch import Bound, State
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Trajectory
 
@@ -45,22 +45,24 @@ APPROACH: Final = 0.5
 MAX_EVENTS: Final = 10_000
 """Impacts within one step beyond which time is said not to pass [1]."""
 
-BANDS: Final[Mapping[str, Band]] = MappingProxyType(
+BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
     {
-        "angular_momentum_drift": Band(1e-3, "|L/L_0 - 1|", "1e-12 at 1e-4 s: only the truncation of RK4", "reduce dt"),
-        "linear_momentum_residual": Band(
+        "angular_momentum_drift": Bound(
+            1e-3, "|L/L_0 - 1|", "1e-12 at 1e-4 s: only the truncation of RK4", "reduce dt"
+        ),
+        "linear_momentum_residual": Bound(
             1e-3, "|p - p_0 - M g t| / (M |omega_0| L)", "1e-12 at 1e-4 s: only the truncation of RK4", "reduce dt"
         ),
-        "constraint_drift": Band(
+        "constraint_drift": Bound(
             1e-9, "largest distance of a slice from the axis / L", "generalised coordinates have no such drift", ""
         ),
-        "omega_mismatch": Band(
+        "omega_mismatch": Bound(
             1e-3, "|omega - L_0/J(positions)| / |omega_0|", "1e-12 at 1e-4 s: only the truncation of RK4", "reduce dt"
         ),
-        "penetration": Band(1e-9, "largest depth of a slice in an end / L", "impacts are located to 1e-12 L", ""),
+        "penetration": Bound(1e-9, "largest depth of a slice in an end / L", "impacts are located to 1e-12 L", ""),
     }
 )
-"""As ``watch.BANDS``, for an engine without constraint solver: what leaves these is a step that is too long."""
+"""As ``watch.BOUNDS``, for an engine without constraint solver: what leaves these is a step that is too long."""
 
 
 def run(scenario: Scenario, order: Order) -> Trajectory:
@@ -142,7 +144,7 @@ class _Flight:
         self._steps, self._sizes = 0, list[float]()
         self._good: list[State] = []
         self._slices: list[tuple[FloatArray, FloatArray]] = []
-        self._worst = dict.fromkeys(BANDS, 0.0)
+        self._worst = dict.fromkeys(BOUNDS, 0.0)
         self._status, self._cause = "ok", ""
         if world.movable:
             contacts.resolve(0.0)
@@ -265,7 +267,7 @@ class _Flight:
     # ------------------------------------------------------------------ bookkeeping
 
     def _record(self) -> None:
-        """Keep the present state as an output point, unless an invariant has left its band."""
+        """Keep the present state as an output point, unless an invariant exceeds its bound."""
         world, scenario = self._world, self._scenario
         state = world.state(self._now)
         if not state.finite:
@@ -273,7 +275,7 @@ class _Flight:
             return
         residuals = watch.measure(state, scenario, self._setup["angular_momentum"])
         self._worst = {name: max(worst, residuals[name]) for name, worst in self._worst.items()}
-        self._cause = watch.first_left(residuals, BANDS)[1]
+        self._cause = watch.first_left(residuals, BOUNDS)[1]
         if self._cause:
             self._status = "diverged"
             return

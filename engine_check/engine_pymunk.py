@@ -104,7 +104,7 @@ class _Flight:
         rows = self._reader.read()
         self._state = self._centred(0.0, 0.0, rows, rows, 0.0, 0.0)
         self._steps, self._sizes = 0, list[float]()
-        self._worst = dict.fromkeys((*watch.BANDS, *(rods.BANDS if exclude else ())), 0.0)
+        self._worst = dict.fromkeys((*watch.BOUNDS, *(rods.BOUNDS if exclude else ())), 0.0)
         self._good: list[State] = []
         self._cause, self._reason = "", ""
 
@@ -113,7 +113,7 @@ class _Flight:
         self._good.append(self._state)
 
     def advance(self, when: float, count: int) -> bool:
-        """Take ``count`` equal steps to the output time ``when`` and record it; False if a band is left."""
+        """Take ``count`` equal steps to the output time ``when`` and record it; False if a bound is exceeded."""
         start = self._state.t
         step = (when - start) / count
         if not self._sizes:
@@ -177,8 +177,8 @@ class _Flight:
                 residuals |= rods.measure(self._state, self._scenario)
             for name, value in residuals.items():
                 self._worst[name] = max(self._worst[name], value)
-            bands = (watch.BANDS, rods.BANDS) if self._exclude else (watch.BANDS,)
-            left = (watch.first_left(residuals, each)[0] for each in bands)
+            bounds = (watch.BOUNDS, rods.BOUNDS) if self._exclude else (watch.BOUNDS,)
+            left = (watch.first_left(residuals, each)[0] for each in bounds)
             self._reason = next(filter(None, left), "")
             cause = watch.broken(residuals, self._cap_thickness)
             return cause or (rods.broken(residuals, self._scenario) if self._exclude else "")

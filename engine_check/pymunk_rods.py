@@ -15,7 +15,7 @@ neighbours can touch; odd and even keep the engine from even asking about the ot
 
 A slice does not turn with the bottle (a point has no orientation), hence circles: their normal is the line between the
 centres, along which angular momentum is exact. Off the axis by d at a distance h/N the line is tilted by d N/h: it puts
-that share of the impulse into the grooves and shortens the rod by half its square (``BANDS``).
+that share of the impulse into the grooves and shortens the rod by half its square (``BOUNDS``).
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from typing import Final
 import numpy as np
 import pymunk
 
-from engine_check.watch import Band, State, first_left
+from engine_check.watch import Bound, State, first_left
 from slicemodel.scenario import Scenario
 
 WALLS: Final = 0b001
 EVEN: Final = 0b010
 ODD: Final = 0b100
 
-BANDS: Final[Mapping[str, Band]] = MappingProxyType(
+BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
     {
-        "overlap": Band(
+        "overlap": Bound(
             1e-2,
             "largest overlap of two neighbours / L",
             "an impact sinks in by v dt, 2e-3 L at 5 m/s and 1e-4 s; 1e-2 L is 2 % of J",
             "reduce dt",
         ),
-        "tilt": Band(
+        "tilt": Bound(
             1e-2,
             "largest slope of the line between two neighbours against the axis",
             "how far the joints let slices off the axis is of order 2 in dt: 4e-6 at 1e-4 s and N = 10; "
@@ -127,7 +127,7 @@ def _meeting(first: Sequence[pymunk.Shape], second: Sequence[pymunk.Shape]) -> l
 
 
 def measure(state: State, scenario: Scenario) -> dict[str, float]:
-    """Return the residuals of a finite state under the names of ``BANDS``."""
+    """Return the residuals of a finite state under the names of ``BOUNDS``."""
     r, _ = state.along_axis()
     u = state.u_r
     across = (state.x[1:] - state.x[0]) @ np.array([-u[1], u[0]])
@@ -148,4 +148,4 @@ def broken(residuals: Mapping[str, float], scenario: Scenario) -> str:
         # There is no swept test: once the centres have crossed, the engine pushes the two on past each other.
         depth = f"{residuals['overlap']:.3g} L, a rod is {rod:.3g} L"
         return f"a slice has passed through its neighbour ({depth}); reduce dt"
-    return first_left(residuals, BANDS)[1]
+    return first_left(residuals, BOUNDS)[1]

@@ -75,7 +75,7 @@ LIMITS: Final[Mapping[str, float]] = MappingProxyType({EARLIER: 4.0, BENT: 1.5})
 2 is the highest here). Half again: an exchange that one of four bottles sees, but not the run at half its step."""
 
 RAISE: Final = "raise iterations"
-"""What the message of a run that left its bands says if its step is not to blame (``watch.BANDS``)."""
+"""What the message of a run that exceeded its bounds says if its step is not to blame (``watch.BOUNDS``)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,8 +98,8 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
-    """How a search ended: code, reason in words, and the settings that were on trial last.
+class Trial:
+    """How a search ended: code, reason in words, and the last settings that were tried.
 
     ``horizon`` is the first output time at which a change exceeds the tolerance [s], None if none does.
     """
@@ -289,7 +289,7 @@ def coarsest_step(times: FloatArray) -> float:
     return longest / max(1, round(longest / COARSEST)) if longest > 0.0 else COARSEST
 
 
-def search(runs: Runs, tolerance: float, levels: int) -> Verdict:
+def search(runs: Runs, tolerance: float, levels: int) -> Trial:
     """Refine what has to be refined until all changes are below ``tolerance``, or ``levels`` settings were tried.
 
     A run that diverges says in its message what to refine; without that, the step is.
@@ -313,12 +313,12 @@ def search(runs: Runs, tolerance: float, levels: int) -> Verdict:
     return last
 
 
-def _trial(runs: Runs, tolerance: float, dt: float, iterations: int | None) -> tuple[Verdict, bool]:
+def _trial(runs: Runs, tolerance: float, dt: float, iterations: int | None) -> tuple[Trial, bool]:
     """Return the verdict on one pair of settings, and whether iterations are what has to be refined."""
     run = runs.make("on trial", dt, iterations, against=runs.known(2 * dt, iterations))
 
-    def refused(status: str, reason: str, horizon: float) -> Verdict:
-        return Verdict(status=status, reason=reason, dt=dt, iterations=iterations, horizon=horizon, tolerance=tolerance)
+    def refused(status: str, reason: str, horizon: float) -> Trial:
+        return Trial(status=status, reason=reason, dt=dt, iterations=iterations, horizon=horizon, tolerance=tolerance)
 
     if not run.ok:
         return refused("diverged", run.message, _reached(run)), RAISE in run.message

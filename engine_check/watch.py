@@ -21,7 +21,7 @@ from slicemodel.trajectory import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Band:
+class Bound:
     """The largest admissible residual, what it is measured against, why, and what to do when it is left."""
 
     limit: float
@@ -30,35 +30,35 @@ class Band:
     remedy: str
 
 
-BANDS: Final[Mapping[str, Band]] = MappingProxyType(
+BOUNDS: Final[Mapping[str, Bound]] = MappingProxyType(
     {
-        "angular_momentum_drift": Band(
+        "angular_momentum_drift": Bound(
             1e-2,
             "|L/L_0 - 1|",
             "every impulse acts along the line between two bodies, so L is exact to round-off (1e-13); "
             "only a position correction, if switched on, moves it, by up to 5e-3",
             "raise iterations",
         ),
-        "linear_momentum_residual": Band(
+        "linear_momentum_residual": Bound(
             1e-6,
             "|p - p_0 - M g t| / (M |omega_0| L)",
             "internal impulses cancel in pairs, so p is exact to round-off (1e-13)",
             "raise iterations",
         ),
-        "constraint_drift": Band(
+        "constraint_drift": Bound(
             1e-3,
             "largest distance of a slice from the axis / L",
             "5e-7 at dt = 1e-4 s and order 2 when the solver has converged, 1e-2 when it has not",
             "raise iterations",
         ),
-        "omega_mismatch": Band(
+        "omega_mismatch": Bound(
             5e-3,
             "|omega - L_0/J(positions)| / |omega_0|",
             "1e-4 or less when the solver has converged, 1e-1 and more when it has not: slices whose "
             "velocities do not follow the tube show here first, while L still holds",
             "raise iterations",
         ),
-        "penetration": Band(
+        "penetration": Bound(
             1e-2,
             "largest depth of a slice in an end / L",
             "an impact sinks in by v dt (2e-3 L at 5 m/s and 1e-4 s), a rest creeps by order dt; 1e-2 L is 2 % of J",
@@ -118,7 +118,7 @@ class State:
 
 
 def measure(state: State, scenario: Scenario, angular_momentum: float) -> dict[str, float]:
-    """Return the residuals of a finite state under the names of ``BANDS``, dimensionless as the bands say.
+    """Return the residuals of a finite state under the names of ``BOUNDS``, dimensionless as the bounds say.
 
     Parameters
     ----------
@@ -149,21 +149,21 @@ def measure(state: State, scenario: Scenario, angular_momentum: float) -> dict[s
 
 
 def broken(residuals: Mapping[str, float], cap_thickness: float) -> str:
-    """Return the cause, in words, if a residual has left its band; the empty string if none has.
+    """Return the cause, in words, if a residual has exceeded its bound; the empty string if none has.
 
     ``cap_thickness`` is in bottle lengths: past the middle of a cap the engine pushes a slice outward.
     """
-    name, words = first_left(residuals, BANDS)
+    name, words = first_left(residuals, BOUNDS)
     if name == "penetration" and residuals[name] > cap_thickness / 2:
         return f"a slice has tunnelled through an end cap ({residuals[name]:.3g} L deep); reduce dt"
     return words
 
 
-def first_left(residuals: Mapping[str, float], bands: Mapping[str, Band]) -> tuple[str, str]:
-    """Return the first residual that has left its band, and how in words; two empty strings if none has."""
-    for name, band in bands.items():
+def first_left(residuals: Mapping[str, float], bounds: Mapping[str, Bound]) -> tuple[str, str]:
+    """Return the first residual that has exceeded its bound, and how in words; two empty strings if none has."""
+    for name, bound in bounds.items():
         # Written as "not inside", because NaN passes every "outside" test.
-        if not residuals[name] <= band.limit:
+        if not residuals[name] <= bound.limit:
             value = f"{name.replace('_', ' ')} {residuals[name]:.3g}"
-            return name, f"{value} exceeds {band.limit:g} ({band.what}); {band.remedy}"
+            return name, f"{value} exceeds {bound.limit:g} ({bound.what}); {bound.remedy}"
     return "", ""

@@ -8,7 +8,7 @@ import pytest
 
 import engine_check
 from engine_check import DEFAULT_DT, watch
-from engine_check.watch import BANDS, State
+from engine_check.watch import BOUNDS, State
 from slicemodel import observables
 from slicemodel.scenario import Scenario
 
@@ -48,7 +48,7 @@ def test_slow_failure_is_caught_although_angular_momentum_holds():
     run = solve(FIFTY, iterations=50)
     assert run.status == "diverged"
     assert run.diagnostics["angular_momentum_drift"] < 1e-12
-    assert run.diagnostics["omega_mismatch"] > BANDS["omega_mismatch"].limit
+    assert run.diagnostics["omega_mismatch"] > BOUNDS["omega_mismatch"].limit
 
 
 def test_creep_beyond_the_band_asks_for_a_smaller_step():
@@ -80,7 +80,7 @@ def residuals(state):
 
 def test_an_exact_state_has_no_residual():
     result = residuals(rigid(FIFTY))
-    assert set(result) == set(BANDS)
+    assert set(result) == set(BOUNDS)
     assert max(result.values()) < 1e-13
     assert watch.broken(result, 0.5) == ""
 
@@ -111,13 +111,13 @@ def kicked(state, row, amount):
 )
 def test_each_fault_leaves_its_own_band(fault, name):
     result = residuals(fault(rigid(FIFTY)))
-    assert not result[name] <= BANDS[name].limit
-    assert watch.broken({**dict.fromkeys(BANDS, 0.0), name: result[name]}, 0.5).startswith(name.replace("_", " "))
+    assert not result[name] <= BOUNDS[name].limit
+    assert watch.broken({**dict.fromkeys(BOUNDS, 0.0), name: result[name]}, 0.5).startswith(name.replace("_", " "))
 
 
 def test_a_slice_past_the_middle_of_a_cap_has_tunnelled():
     result = residuals(moved(rigid(FIFTY), 1, 0.1, 0.0))
-    assert "tunnelled" in watch.broken({**dict.fromkeys(BANDS, 0.0), "penetration": result["penetration"]}, 0.5)
+    assert "tunnelled" in watch.broken({**dict.fromkeys(BOUNDS, 0.0), "penetration": result["penetration"]}, 0.5)
 
 
 def test_thin_caps_are_tunnelled_and_the_run_says_so(monkeypatch):
@@ -139,7 +139,7 @@ def test_not_finite_is_a_cause():
 
 
 def test_every_band_has_a_reason_and_a_remedy():
-    for band in BANDS.values():
-        assert band.limit > 0
-        assert band.reason
-        assert band.remedy
+    for bound in BOUNDS.values():
+        assert bound.limit > 0
+        assert bound.reason
+        assert bound.remedy

@@ -367,10 +367,10 @@ def test_a_step_too_long_for_a_throw_is_seen(monkeypatch):
 
 
 def test_each_fault_leaves_its_own_band():
-    none = dict.fromkeys(rods.BANDS, 0.0)
+    none = dict.fromkeys(rods.BOUNDS, 0.0)
     assert rods.broken(none, THROW) == ""
     assert rods.broken(none | {"overlap": 0.011}, THROW).startswith("overlap 0.011 exceeds 0.01")
     assert "passed through" in rods.broken(none | {"overlap": THROW.slice_height / 0.25}, THROW)
     assert rods.broken(none | {"tilt": 0.02}, THROW).startswith("tilt 0.02 exceeds 0.01")
-    for name in rods.BANDS:
+    for name in rods.BOUNDS:
         assert rods.broken(none | {name: math.nan}, THROW)

@@ -16,7 +16,7 @@ from flipproof.output.templating import environment
 from flipproof.paper import claims_figures_6_7, observe
 from flipproof.paper import claims_figures_8_9 as landing
 from flipproof.paper.cases import FAMILIES, all_cases, family, numbers, paper_throw
-from flipproof.paper.observe import Flights
+from flipproof.paper.observe import CaseFlights
 from flipproof.paper.runs import (
     BANDS,
     HALVES,
@@ -54,7 +54,9 @@ def flight(scenario, curve, *, points=1001, theta=None, **told):
 
 def flown(runs, solver=PUBLISHED):
     """Return flights that were made, by their keys."""
-    return Flights(solver=solver, made={key: Made(Run(solver, run.scenario), run, 0.0) for key, run in runs.items()})
+    return CaseFlights(
+        solver=solver, made={key: Made(Run(solver, run.scenario), run, 0.0) for key, run in runs.items()}
+    )
 
 
 def always(answer):
@@ -493,7 +495,7 @@ def test_half_the_slices_give_the_band_and_tolerances_are_added():
 
 def test_a_missing_or_broken_flight_leaves_a_claim_undecided_and_says_why():
     failed = Made(Run("eq8", THROW, label="the tenth"), None, 0.0, "ValueError: no such bottle")
-    judgement = judge(BY_ID["tenth-slows"], Flights(solver="eq8", made={"filling 0.1": failed}))
+    judgement = judge(BY_ID["tenth-slows"], CaseFlights(solver="eq8", made={"filling 0.1": failed}))
     assert judgement.verdict == "cannot be decided"
     assert judgement.words == "the tenth: ValueError: no such bottle"
     assert not judgement.marginal

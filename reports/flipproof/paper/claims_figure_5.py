@@ -13,7 +13,7 @@ from flipproof.chapters.errata.programs import SQUARE, exponents_of_cost
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
-from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, Flights
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, CaseFlights
 from flipproof.paper.runs import MANY_SLICES, MANY_STEPS, MANY_STEPS_KEY, PUBLISHED, SAME_STEPS_KEY
 from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states
 from slicemodel import Trajectory
@@ -37,7 +37,7 @@ DETECTED: Final = 0.005
     of_geometry=True,
     otherwise={"as an equation, to a quarter": {"factor": 1.25}},
 )
-def _release_spin(_: Flights, factor: float = ORDER) -> Iterator[Reading]:
+def _release_spin(_: CaseFlights, factor: float = ORDER) -> Iterator[Reading]:
     spin = release_angular_velocity(paper_throw(), number("launch-speed"))
     usual = number("release-spin")
     note = "the formula holds for a bottle swung about its cap"
@@ -54,7 +54,7 @@ def _release_spin(_: Flights, factor: float = ORDER) -> Iterator[Reading]:
     why="Of one order of magnitude: within a factor of √10.",
     of_geometry=True,
 )
-def _spin_scale(_: Flights) -> Iterator[Reading]:
+def _spin_scale(_: CaseFlights) -> Iterator[Reading]:
     gravity, length = paper_throw().gravity, paper_throw().bottle.length / 2
     note = (
         f"ℓ = {length:g} m; {math.sqrt(gravity / 0.1):.1f} rad/s for the paper's rounded 0.1 m. In free "
@@ -87,7 +87,7 @@ def _figure_5(id_: str, says: str, means: str, why: str, place: str = "Fig. 5") 
     "The sentence is an inequality: its threshold is zero.",
     "Fig. 5a",
 )
-def _sticking_slices(flights: Flights, damping: str = "") -> Iterator[Reading]:
+def _sticking_slices(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     left = observe.departures(flights.at("beta" + damping, 0.0))
     value, band, note = 0.0, 0.0, "no slice leaves an end"
     if left:
@@ -106,7 +106,7 @@ def _sticking_slices(flights: Flights, damping: str = "") -> Iterator[Reading]:
     "The sentence is a comparison: its threshold is zero.",
     "Fig. 5b",
 )
-def _elastic_rises_late(flights: Flights, damping: str = "") -> Iterator[Reading]:
+def _elastic_rises_late(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     elastic, sticky, half = (observe.late_mean(flights.at("beta" + damping, beta)) for beta in (-1.0, 0.0, -0.5))
     note = f"{elastic:.3f} against {sticky:.3f} for β = 0 and {half:.3f} for β = −0.5"
     more = elastic - max(sticky, half)
@@ -120,7 +120,7 @@ def _elastic_rises_late(flights: Flights, damping: str = "") -> Iterator[Reading
     "The share is that of ω for “superimposed”, a word of ours: 0.05 of what the axis shows.",
     "Fig. 5b",
 )
-def _angle_hardly_depends_on_rebound(flights: Flights, damping: str = "") -> Iterator[Reading]:
+def _angle_hardly_depends_on_rebound(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     sticky, half = (flights.at("beta" + damping, beta) for beta in (0.0, -0.5))
     apart = np.abs(half.theta - np.interp(half.t, sticky.t, sticky.theta))
     most, time = float(apart.max()), half.t[int(apart.argmax())]
@@ -144,7 +144,7 @@ def flat_plateau(run: Trajectory) -> Iterator[Reading]:
     f"0.5 is the upper end of the paper's own range in Fig. 7b. {FLAT_WHY}",
     "Fig. 5c",
 )
-def _half_elastic_is_flat(flights: Flights, damping: str = "") -> Iterator[Reading]:
+def _half_elastic_is_flat(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     run = flights.at("beta" + damping, -0.5)
     yield Reading("plateau ω_f", observe.level(run), OMEGA, at_most(0.5))
     yield from flat_plateau(run)
@@ -157,7 +157,7 @@ def _half_elastic_is_flat(flights: Flights, damping: str = "") -> Iterator[Readi
     FLAT_WHY,
     "Fig. 5c",
 )
-def _other_rebounds_rise_late(flights: Flights, damping: str = "") -> Iterator[Reading]:
+def _other_rebounds_rise_late(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     for beta, name in ((0.0, "late rise for β = 0"), (-1.0, "late rise for β = −1")):
         yield Reading(name, observe.late_rise(flights.at("beta" + damping, beta)), OMEGA, at_least(FLAT))
 
@@ -169,7 +169,7 @@ def _other_rebounds_rise_late(flights: Flights, damping: str = "") -> Iterator[R
     "The sentence is a comparison: its threshold is zero.",
     "Fig. 5d",
 )
-def _few_slices(flights: Flights, damping: str = "") -> Iterator[Reading]:
+def _few_slices(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     finest = _finest(flights, damping)
     most = finest.scenario.n_slices
     off = flights.measured("slices" + damping, lambda run: observe.distance(run, finest), high=most - 1)
@@ -187,7 +187,7 @@ def _few_slices(flights: Flights, damping: str = "") -> Iterator[Reading]:
     "0.005 ω₀ is a two-hundredth of the axis of Fig. 5d: less cannot be seen there.",
     "Fig. 5d",
 )
-def _minimum_shifts(flights: Flights, damping: str = "") -> Iterator[Reading]:
+def _minimum_shifts(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     finest = float(observe.normalised(_finest(flights, damping)).min())
     shift = flights.measured(
         "slices" + damping, lambda run: abs(float(observe.normalised(run).min()) - finest), 10.0, MANY_SLICES
@@ -202,7 +202,7 @@ def _minimum_shifts(flights: Flights, damping: str = "") -> Iterator[Reading]:
     yield Reading("shift of the minimum, N = 100", last, OMEGA, at_most(DETECTED), last)
 
 
-def _finest(flights: Flights, damping: str) -> Trajectory:
+def _finest(flights: CaseFlights, damping: str) -> Trajectory:
     """Return the flight with the most slices, the paper's 500."""
     return flights.at("slices" + damping, max(numbers("figure-5d-slices")))
 
@@ -234,7 +234,7 @@ def _of_programs(id_: str, place: str, says: str, means: str, why: str) -> Calla
     "The exponent of N in the counted work is 1.8 to 2.2.",
     SQUARE_WHY,
 )
-def _cost_of_slices(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
+def _cost_of_slices(_: CaseFlights, program: str = "MATLAB") -> Iterator[Reading]:
     yield Reading("exponent of N in the work", _exponents(program)[0], "", SQUARE, note=_counted(program))
 
 
@@ -246,7 +246,7 @@ def _cost_of_slices(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
     "The exponent of P in the counted work is 1.8 to 2.2.",
     SQUARE_WHY,
 )
-def _cost_of_intervals(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
+def _cost_of_intervals(_: CaseFlights, program: str = "MATLAB") -> Iterator[Reading]:
     yield Reading("exponent of P in the work", _exponents(program)[1], "", SQUARE, note=_counted(program))
 
 
@@ -265,7 +265,7 @@ def _counted(program: str) -> str:
     "The exponent of P in the counted work exceeds that of N by 0.1 at least.",
     "The sentence is a comparison; 0.1 is what counting from 250 to 1000 leaves open.",
 )
-def _cost_of_steps(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
+def _cost_of_steps(_: CaseFlights, program: str = "MATLAB") -> Iterator[Reading]:
     of_n, of_p = _exponents(program)
     note = f"{of_p:.2f} and {of_n:.2f} in the {program} program"
     yield Reading("exponent of P minus exponent of N in the work", of_p - of_n, "", at_least(0.1), note=note)
@@ -283,7 +283,7 @@ def _cost_of_steps(_: Flights, program: str = "MATLAB") -> Iterator[Reading]:
     judges=(PUBLISHED, "eq8"),
     silent="it is only solved event by event, with time steps of its own choice",
 )
-def _steps_are_enough(flights: Flights) -> Iterator[Reading]:
+def _steps_are_enough(flights: CaseFlights) -> Iterator[Reading]:
     off, against, fewer = {}, "the event-driven solution", ""
     for filling in numbers("figure-S1-filling"):
         own = flights.at("filling", filling)
@@ -299,7 +299,7 @@ def _steps_are_enough(flights: Flights) -> Iterator[Reading]:
     yield Reading(f"distance of P = {paper_steps()} from {against}", most, OMEGA, at_most(0.01), note=note)
 
 
-def _fewer_steps(flights: Flights) -> str:
+def _fewer_steps(flights: CaseFlights) -> str:
     """Return what a tenth of the steps does, and to the paper's plateau: its points then span a fifth of the flight."""
     fewer = flights.at("steps 0.5", 100)
     apart = observe.distance(fewer, flights.at("filling", 0.5))

@@ -12,7 +12,7 @@ from typing import Final
 from flipproof.paper import observe
 from flipproof.paper.cases import numbers
 from flipproof.paper.claims_figure_5 import flat_plateau
-from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, SUPERIMPOSED_WHY, Flights, level, level_by_points
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, SUPERIMPOSED_WHY, CaseFlights, level, level_by_points
 from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states
 
 # ---------------------------------------------------------------------- drag (Fig. 6)
@@ -31,7 +31,7 @@ _of_drag: Final = partial(states, throw="half full, β = −0.5, α as named (Fi
     "farther than 0.05 ω₀ (root mean square) from it.",
     why=SUPERIMPOSED_WHY,
 )
-def _sensitive_to_drag(flights: Flights) -> Iterator[Reading]:
+def _sensitive_to_drag(flights: CaseFlights) -> Iterator[Reading]:
     settled = flights.at("drag", 0.01)
     off = {drag: observe.distance(flights.at("drag", drag), settled) for drag in (0.0075, 0.0125)}
     name = "distance of the curves for α = 0.0075 and 0.0125 from that for 0.01, the smaller"
@@ -46,7 +46,7 @@ def _sensitive_to_drag(flights: Flights) -> Iterator[Reading]:
     means="At most half as much water as for α = 0 is ever in the cap's half of the bottle at once.",
     why="Half is a choice of ours for “impeded”.",
 )
-def _strong_drag_impedes(flights: Flights) -> Iterator[Reading]:
+def _strong_drag_impedes(flights: CaseFlights) -> Iterator[Reading]:
     free = observe.largest_share_near_cap(flights.at("drag", 0.0))
     for drag in STRONG_DRAGS:
         share = observe.largest_share_near_cap(flights.at("drag", drag)) / free
@@ -54,7 +54,7 @@ def _strong_drag_impedes(flights: Flights) -> Iterator[Reading]:
         yield Reading(name, share, "", at_most(0.5), note=f"{100 * free:.0f} % of the water for α = 0")
 
 
-def _angle_grows_again_with_drag(flights: Flights) -> Iterator[Reading]:
+def _angle_grows_again_with_drag(flights: CaseFlights) -> Iterator[Reading]:
     turned = flights.measured("drag", lambda run: math.degrees(float(run.theta[-1])))
     rising = [turned[b] - turned[a] for a, b in pairwise(sorted(turned)) if b in STRONG_DRAGS]
     note = ", ".join(f"{angle:.0f}° for {drag:g}" for drag, angle in turned.items())
@@ -62,14 +62,14 @@ def _angle_grows_again_with_drag(flights: Flights) -> Iterator[Reading]:
     yield Reading("growth of θ(T) from one α to the next from 0.0125 on, the least", min(rising), "°", at_least(0.0))
 
 
-def _strong_drag_turns_back(flights: Flights) -> Iterator[Reading]:
+def _strong_drag_turns_back(flights: CaseFlights) -> Iterator[Reading]:
     lowest = {drag: float(observe.normalised(flights.at("drag", drag)).min()) for drag in STRONG_DRAGS}
     drag, least = min(lowest.items(), key=itemgetter(1))
     note = f"for α = {drag:g}; Eq. 12 keeps the sign of ω, so that θ can never turn back"
     yield Reading("lowest ω", least, OMEGA, at_most(0.0), note=note)
 
 
-def _strong_drag_oscillates(flights: Flights) -> Iterator[Reading]:
+def _strong_drag_oscillates(flights: CaseFlights) -> Iterator[Reading]:
     for drag in STRONG_DRAGS:
         name = f"largest climb over the lowest ω until then, α = {drag:g}"
         yield Reading(name, observe.climb(flights.at("drag", drag)), OMEGA, at_least(FLAT))
@@ -104,7 +104,7 @@ _oscillates: Final = _of_drag(
     means="ω over the last tenth of the flight lies at least 0.1 ω₀ over the plateau.",
     why=FLAT_WHY,
 )
-def _no_drag_rises_late(flights: Flights) -> Iterator[Reading]:
+def _no_drag_rises_late(flights: CaseFlights) -> Iterator[Reading]:
     rise = observe.late_rise(flights.at("drag", 0.0))
     yield Reading("late rise over the plateau for α = 0", rise, OMEGA, at_least(FLAT))
 
@@ -118,7 +118,7 @@ def _moderate_drag(drag: float) -> Statement:
         "and ω never climbs by more than 0.1 ω₀ over its lowest value until then.",
         why=f"A quarter of the flight is a choice of ours for “sudden”. {FLAT_WHY}",
     )
-    def is_flat(flights: Flights) -> Iterator[Reading]:
+    def is_flat(flights: CaseFlights) -> Iterator[Reading]:
         run = flights.at("drag", drag)
         yield from flat_plateau(run)
         yield Reading("time to half the drop", observe.drop_time(run), "of T", at_most(0.25))
@@ -154,24 +154,24 @@ SLOW_WHY: Final = "“Slower” is a word of ours for ω below 0.8 ω₀, “not
     means="So at more than half of the fillings from 0.2 to 0.75; ω_f is the lowest mean over T/50.",
     why="“Most” is more than half; the range is the paper's, the choice of fillings ours.",
 )
-def _plateau_range(flights: Flights) -> Iterator[Reading]:
+def _plateau_range(flights: CaseFlights) -> Iterator[Reading]:
     note = plateau_range_words(flights) + _by_points(flights)
     yield Reading(RANGE_NAME, share_in_range(flights), "", at_least(MOST), note=note)
 
 
-def share_in_range(flights: Flights) -> float:
+def share_in_range(flights: CaseFlights) -> float:
     """Return the share of the intermediate fillings at which omega_f / omega_0 lies in the paper's range."""
     levels = flights.measured("filling", level, *INTERMEDIATE).values()
     return sum(OPTIMUM[0] <= value <= OPTIMUM[1] for value in levels) / len(levels)
 
 
-def plateau_range_words(flights: Flights) -> str:
+def plateau_range_words(flights: CaseFlights) -> str:
     """Return between which values omega_f / omega_0 lies at the intermediate fillings."""
     levels = flights.measured("filling", level, *INTERMEDIATE).values()
     return f"ω_f/ω₀ from {min(levels):.3f} to {max(levels):.3f} at {len(levels)} fillings"
 
 
-def _by_points(flights: Flights) -> str:
+def _by_points(flights: CaseFlights) -> str:
     """Return where the paper's average over points and the mean over time differ by more than 0.005 of omega_0."""
     time, points = (flights.measured("filling", read) for read in (level, level_by_points))
     differ = ", ".join(
@@ -184,7 +184,7 @@ def _by_points(flights: Flights) -> str:
     return "; the paper's average over points agrees with the mean over time"
 
 
-def _plateau_at(flights: Flights, filling: float, admissible: tuple[float, float]) -> Iterator[Reading]:
+def _plateau_at(flights: CaseFlights, filling: float, admissible: tuple[float, float]) -> Iterator[Reading]:
     yield Reading(f"ω_f at M̃ = {filling:g}", level(flights.at("filling", filling)), OMEGA, admissible)
 
 
@@ -215,7 +215,7 @@ _slow_down_at_a_tenth: Final = _about_slowing(
 )(partial(_slows_at, filling=0.1))
 
 
-def filling_of_slow_down(flights: Flights) -> float:
+def filling_of_slow_down(flights: CaseFlights) -> float:
     """Return the least filling with omega_f = 0.8 omega_0, interpolated between flights; NaN if there is none."""
     levels = sorted(flights.measured("filling", level).items())
     for (low, above), (high, below) in pairwise(levels):
@@ -234,7 +234,7 @@ def filling_of_slow_down(flights: Flights) -> float:
     why=f"The interval is the paper's. {SLOW_WHY}",
     kind="admitted limit",
 )
-def _change_at_low_filling(flights: Flights) -> Iterator[Reading]:
+def _change_at_low_filling(flights: CaseFlights) -> Iterator[Reading]:
     note = (
         "interpolated between the fillings flown: 0.05, 0.09, 0.095, 0.1, 0.13, 0.135, 0.14, 0.15, 0.2; that "
         "adds an error of up to 0.002"
@@ -254,7 +254,7 @@ def _change_at_low_filling(flights: Flights) -> Iterator[Reading]:
         "with M̃ = 0.1, where the text says of the experiment: very close to ice": partial(_keeps_spin_at, filling=0.1)
     },
 )
-def _agreement_is_excellent(flights: Flights) -> Iterator[Reading]:
+def _agreement_is_excellent(flights: CaseFlights) -> Iterator[Reading]:
     low, high = OPTIMUM
     for filling in (0.25, 0.33, 0.5):
         yield from _plateau_at(flights, filling, (low - SUPERIMPOSED, high + SUPERIMPOSED))
@@ -268,7 +268,7 @@ def _agreement_is_excellent(flights: Flights) -> Iterator[Reading]:
     means="The lowest ω_f is at one of them.",
     why="The sentence is a comparison: its threshold is zero.",
 )
-def _best_filling(flights: Flights) -> Iterator[Reading]:
+def _best_filling(flights: CaseFlights) -> Iterator[Reading]:
     levels = flights.measured("filling", level)
     inside = flights.measured("filling", level, *OPTIMUM)
     best, lowest = min(inside.items(), key=itemgetter(1))

@@ -13,7 +13,7 @@ from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
-from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, SUPERIMPOSED_WHY, Flights
+from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, SUPERIMPOSED_WHY, CaseFlights
 from flipproof.paper.statements import OMEGA, Reading, at_least, at_most, states
 from slicemodel import Bottle, Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
@@ -35,7 +35,7 @@ HALF_FULL: Final = "half full, α = 0.01 kg/s, β = −0.5"
     throw=f"{HALF_FULL}; 20, 25 and 30 rad/s",
     why=f"{SUPERIMPOSED_WHY} T/1000 is one time step of the paper.",
 )
-def _fast_spin_changes_only_time(flights: Flights) -> Iterator[Reading]:
+def _fast_spin_changes_only_time(flights: CaseFlights) -> Iterator[Reading]:
     usual = number("release-spin")
     levels, drops = (flights.measured("spin", read, low=usual) for read in (observe.level, observe.drop_time))
     change = {spin: abs(levels[spin] - levels[usual]) for spin in sorted(levels)}
@@ -61,7 +61,7 @@ def _least_delay(drops: dict[float, float]) -> float:
     throw=f"{HALF_FULL}; 10 and 15 rad/s",
     why=FLAT_WHY,
 )
-def _slow_spin_is_not_monotonic(flights: Flights) -> Iterator[Reading]:
+def _slow_spin_is_not_monotonic(flights: CaseFlights) -> Iterator[Reading]:
     for spin in numbers("figure-8a-spin"):
         if 10.0 <= spin < number("release-spin"):
             name = f"largest climb over the lowest ω until then, {spin:g} rad/s"
@@ -82,7 +82,7 @@ def _slow_spin_is_not_monotonic(flights: Flights) -> Iterator[Reading]:
     },
 )
 def _angle_hardly_matters(
-    flights: Flights, apart: Callable[[Trajectory, Trajectory], float] = observe.shape_distance
+    flights: CaseFlights, apart: Callable[[Trajectory, Trajectory], float] = observe.shape_distance
 ) -> Iterator[Reading]:
     usual = flights.at("angle", number("release-angle"))
     off = flights.measured("angle", lambda run: apart(run, usual))
@@ -99,7 +99,7 @@ def _angle_hardly_matters(
     throw=f"{HALF_FULL}; θ₀ = 0, 30, 60 and 90°",
     why="T/1000 is one time step of the paper.",
 )
-def _drop_is_later_near_vertical(flights: Flights) -> Iterator[Reading]:
+def _drop_is_later_near_vertical(flights: CaseFlights) -> Iterator[Reading]:
     drops = flights.measured("angle", observe.drop_time, high=number("release-angle"))
     note = ", ".join(f"{drops[angle]:.3f} at {math.degrees(angle):.0f}°" for angle in sorted(drops))
     name = "by how much each smaller θ₀ drops later, the least"
@@ -114,7 +114,7 @@ def _drop_is_later_near_vertical(flights: Flights) -> Iterator[Reading]:
     throw=f"{HALF_FULL}; the text names no aspect ratio",
     why=SUPERIMPOSED_WHY,
 )
-def _aspect_ratio_does_not_matter(flights: Flights) -> Iterator[Reading]:
+def _aspect_ratio_does_not_matter(flights: CaseFlights) -> Iterator[Reading]:
     bottle = paper_throw().bottle
     own = flights.at("aspect", bottle.length / (2 * bottle.radius))
     off = flights.measured("aspect", lambda run: observe.distance(run, own))
@@ -166,7 +166,7 @@ def toppling_peak() -> tuple[float, float]:
     why="The last digits that the paper prints.",
     of_geometry=True,
 )
-def _toppling_peak(_: Flights) -> Iterator[Reading]:
+def _toppling_peak(_: CaseFlights) -> Iterator[Reading]:
     filling, angle = toppling_peak()
     yield Reading("filling of the largest θ_c, Eq. 13b", filling, "", (0.13, 0.15))
     yield Reading("largest θ_c, Eq. 13b", math.degrees(angle), "°", (44.9, 45.5))
@@ -186,7 +186,7 @@ def lowered_by(run: Trajectory, when: When = upright) -> float:
     why="The sentence is a comparison: its threshold is zero.",
     otherwise={ON_LANDING: {"when": at_landing_time}},
 )
-def _dynamic_angle_is_lower(flights: Flights, when: When = upright) -> Iterator[Reading]:
+def _dynamic_angle_is_lower(flights: CaseFlights, when: When = upright) -> Iterator[Reading]:
     lower = flights.measured("long", partial(lowered_by, when=when), high=0.75)
     at, least = min(lower.items(), key=itemgetter(1))
     above = ", ".join(f"{filling:g}" for filling, value in lower.items() if value <= 0.0)
@@ -203,7 +203,7 @@ def _dynamic_angle_is_lower(flights: Flights, when: When = upright) -> Iterator[
     why="3° is a choice of ours: a twentieth of the axis of Fig. 9b.",
     otherwise={ON_LANDING: {"when": at_landing_time}},
 )
-def _dynamic_angle_agrees_when_full(flights: Flights, when: When = upright) -> Iterator[Reading]:
+def _dynamic_angle_agrees_when_full(flights: CaseFlights, when: When = upright) -> Iterator[Reading]:
     off = flights.measured("long", lambda run: abs(lowered_by(run, when)), low=0.9)
     at, most = max(off.items(), key=itemgetter(1))
     name = "largest difference of static and dynamic θ_c above M̃ = 0.75"
@@ -224,7 +224,7 @@ def _dynamic_angle_agrees_when_full(flights: Flights, when: When = upright) -> I
         "as negative dr_CM/dt at t = 0.5 s": {"base": -1.0, "when": at_landing_time},
     },
 )
-def _centre_of_mass_falls(flights: Flights, when: When = upright, base: float = 1.0) -> Iterator[Reading]:
+def _centre_of_mass_falls(flights: CaseFlights, when: When = upright, base: float = 1.0) -> Iterator[Reading]:
     velocity = flights.measured("long", lambda run: when(run).v_cm, 0.25, 0.6)
     worst = min(velocity, key=lambda filling: base * velocity[filling])
     all_ = ", ".join(f"{v:+.2f} at {filling:g}" for filling, v in velocity.items()).replace("-", "\N{MINUS SIGN}")

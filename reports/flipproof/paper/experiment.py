@@ -22,7 +22,7 @@ from flipproof.paper.claims_figures_6_7 import (
     plateau_range_words,
     share_in_range,
 )
-from flipproof.paper.observe import FLAT, Flights, climb, normalised, steady_level
+from flipproof.paper.observe import FLAT, CaseFlights, climb, normalised, steady_level
 from flipproof.paper.runs import CONTESTANTS
 from flipproof.paper.statements import OMEGA, Reading, judge_sense
 from slicemodel.observables import static_toppling_angle
@@ -60,12 +60,12 @@ class Observation:
     place: str
     says: str
     means: str
-    read: Callable[[Flights], float]
+    read: Callable[[CaseFlights], float]
     unit: str
     measured: tuple[float, float]
     why: str
     slack: float = 0.0
-    numbers: Callable[[Flights], str] = lambda _: ""
+    numbers: Callable[[CaseFlights], str] = lambda _: ""
     remark: str = ""
     ranked: bool = True
     readings: Mapping[str, Reading] = field(default_factory=dict)
@@ -99,20 +99,20 @@ class Observation:
         }
 
 
-def _landing_angles(flights: Flights) -> dict[float, float]:
+def _landing_angles(flights: CaseFlights) -> dict[float, float]:
     """Return theta at the paper's time of landing, by filling of the bottles that were thrown and filmed [degrees]."""
     filmed = (0.1, 0.25, 0.33, 0.5, 0.75)
     return {filling: math.degrees(float(flights.at("filling", filling).theta[-1])) for filling in filmed}
 
 
-def landing_angles_words(flights: Flights) -> str:
+def landing_angles_words(flights: CaseFlights) -> str:
     """Return theta at the time of landing, and how far that is from the nearest upright, by filling."""
     angles = _landing_angles(flights)
     words = (f"{angle:.0f}° at {fill:g} ({math.remainder(angle, 360.0):+.0f}°)" for fill, angle in angles.items())
     return "θ(T): " + ", ".join(words).replace("-", "\N{MINUS SIGN}")
 
 
-def worst_landing(flights: Flights) -> float:
+def worst_landing(flights: CaseFlights) -> float:
     """Return by how much the tilt on landing exceeds the angle at which the bottle topples, the most [degrees]."""
     return max(
         abs(math.remainder(angle, 360.0)) - math.degrees(static_toppling_angle(paper_throw(filling)))
@@ -244,12 +244,12 @@ OBSERVATIONS: Final = (
 )
 
 
-def compare(observation: Observation, flights: Flights) -> Reading:
+def compare(observation: Observation, flights: CaseFlights) -> Reading:
     """Return the number of one equation with its band; NaN with the reason where a flight is missing."""
     low, high = observation.measured
     bounds = (low - observation.slack, high + observation.slack)
 
-    def read(each: Flights) -> Iterator[Reading]:
+    def read(each: CaseFlights) -> Iterator[Reading]:
         yield Reading(observation.means, observation.read(each), observation.unit, bounds)
 
     judgement = judge_sense(read, flights)
@@ -259,7 +259,7 @@ def compare(observation: Observation, flights: Flights) -> Reading:
     return replace(judgement.readings[0], note=note)
 
 
-def compare_all(flights: Sequence[Flights]) -> tuple[Observation, ...]:
+def compare_all(flights: Sequence[CaseFlights]) -> tuple[Observation, ...]:
     """Return every statement about the experiment with the numbers of all equations."""
     return tuple(
         replace(each, readings={equation.solver: compare(each, equation) for equation in flights})

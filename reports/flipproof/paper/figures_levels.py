@@ -58,7 +58,7 @@ def _exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:
     lowest = _points(runs, "around the minimum, as the paper has it", "filling", level_by_points, filled=True)
     second = _points(runs, "mean of the second half", "filling", steady_level, filled=False)
     row = _row(Axis("ω_f / ω₀ [1]", "omega_f/omega_0 [1]", 0.0, 1.05), (lowest, second))
-    best = panels.Band("x", 0.2, 0.5, "best filling as the paper has it")
+    best = panels.Shade("x", 0.2, 0.5, "best filling as the paper has it")
     yield panels.exhibit_grid(
         "7b", "the level ω falls to, over the filling",
         "Filled: mean of the 21 points around the minimum. Open: mean of the second half of the flight; where the two "
@@ -94,9 +94,9 @@ def _exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
     curves = [abs(v) for points in (upright, landed) for values in points.values.values() for v in values.values()]
     most = 1.1 * max([*curves, 0.25])
     row = _row(Axis("v_CM in the bottle [m/s], to the base", "v_CM [m/s]", -most, most), (upright, landed))
-    bands = (
-        panels.Band("x", 0.25, 0.6, "where the paper has it beyond 0.2 m/s"),
-        panels.Band("y", -0.2, 0.2, "slower than 0.2 m/s"),
+    shades = (
+        panels.Shade("x", 0.25, 0.6, "where the paper has it beyond 0.2 m/s"),
+        panels.Shade("y", -0.2, 0.2, "slower than 0.2 m/s"),
     )
     yield panels.exhibit_grid(
         "9c", "velocity of the centre of mass on landing",
@@ -106,7 +106,7 @@ def _exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
         "outside the horizontal one. Its photographs are not drawn again.",
         "Velocity of the centre of mass in the bottle in m/s against filling by three solvers. At theta = 2 pi: "
         f"{upright.words(2)}. At 0.5 s: {landed.words(2)}.",
-        Grid(FILLING, (row,), 3.2, bands),
+        Grid(FILLING, (row,), 3.2, shades),
     )  # fmt: skip
 
 

@@ -71,7 +71,7 @@ class Row:
     heading: str = ""
 
 
-class Band(NamedTuple):
+class Shade(NamedTuple):
     """A shaded range along "x" or "y"; its label says whose it is."""
 
     along: str
@@ -82,12 +82,12 @@ class Band(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Rows of panels over one horizontal axis, each ``height`` inches high; bands are shaded in every panel."""
+    """Rows of panels over one horizontal axis, each ``height`` inches high; shades lie in every panel."""
 
     x: Axis
     rows: tuple[Row, ...]
     height: float = 2.5
-    bands: tuple[Band, ...] = ()
+    shades: tuple[Shade, ...] = ()
     legend_columns: int = 6
 
 
@@ -125,9 +125,9 @@ def figure_grid(grid: Grid) -> Figure:
         for lines, place in zip(row.lines.values(), places, strict=True):
             for line in lines:
                 place.plot(line.x, line.y, label=line.label, **line.look)
-            for band in grid.bands:
-                shade, colour = (place.axvspan, "#999999") if band.along == "x" else (place.axhspan, "#E69F00")
-                shade(band.low, band.high, color=colour, alpha=0.18, linewidth=0, label=band.label, zorder=0)
+            for shade in grid.shades:
+                draw, colour = (place.axvspan, "#999999") if shade.along == "x" else (place.axhspan, "#E69F00")
+                draw(shade.low, shade.high, color=colour, alpha=0.18, linewidth=0, label=shade.label, zorder=0)
             _set_range(place, grid.x, row)
         # Beside the row, not in it: there it would cover curves.
         places[0].set_ylabel("\n".join(filter(None, (row.heading, row.y.label))))

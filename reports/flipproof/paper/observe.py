@@ -27,7 +27,7 @@ SUPERIMPOSED_WHY: Final = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Flights:
+class CaseFlights:
     """The flights of one equation by the key of their case; ``seen`` are those that were looked at.
 
     ``halved`` are the same flights with half the slices wherever their number is not the subject, ``half_steps`` those
@@ -36,8 +36,8 @@ class Flights:
 
     solver: str
     made: Mapping[str, Made]
-    halved: Flights | None = None
-    half_steps: Flights | None = None
+    halved: CaseFlights | None = None
+    half_steps: CaseFlights | None = None
     seen: dict[str, Trajectory] = field(default_factory=dict)
 
     def run(self, key: str) -> Trajectory:

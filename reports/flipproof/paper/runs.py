@@ -82,7 +82,7 @@ class PaperRuns:
         made |= {name: made for call in calls for name, made in answers.answer(call).items()}
         return cls(made=made, costs=tuple(cost for call in costs for cost in answers.answer(call)))
 
-    def flights(self, solver: str) -> observe.Flights:
+    def flights(self, solver: str) -> observe.CaseFlights:
         """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
 
         def of(wanted: Half) -> dict[str, Made]:
@@ -90,9 +90,9 @@ class PaperRuns:
 
         usual = of("")
         halved, half_steps = (
-            observe.Flights(solver=solver, made=usual | own) if (own := of(half)) else None for half in HALVES
+            observe.CaseFlights(solver=solver, made=usual | own) if (own := of(half)) else None for half in HALVES
         )
-        return observe.Flights(solver=solver, made=usual, halved=halved, half_steps=half_steps)
+        return observe.CaseFlights(solver=solver, made=usual, halved=halved, half_steps=half_steps)
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return the trajectory of a case, or None if it was not planned or failed."""

@@ -15,7 +15,7 @@ from typing import Any, Final, Literal
 
 from flipproof.frame.findings import Band, Finding, finite_or_none, observed
 from flipproof.frame.solvers import Missing
-from flipproof.paper.observe import Flights
+from flipproof.paper.observe import CaseFlights
 from flipproof.paper.runs import BANDS
 
 Verdict = Literal["holds", "fails", "cannot be decided", "not judged"]
@@ -235,7 +235,7 @@ class Judgement:
 
 
 Read = Callable[..., Iterator[Reading]]
-"""Flights of one equation -> what is read off them; raises ``Missing`` where there is nothing to read."""
+"""CaseFlights of one equation -> what is read off them; raises ``Missing`` where there is nothing to read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -327,7 +327,7 @@ def states(
     return stated
 
 
-def judge(statement: Statement, flights: Flights) -> Judgement:
+def judge(statement: Statement, flights: CaseFlights) -> Judgement:
     """Return the judgement of one equation; a flight that is missing leaves it undecided and says why."""
     if statement.judges and flights.solver not in statement.judges:
         return Judgement(solver=flights.solver, silent=statement.silent)
@@ -337,7 +337,7 @@ def judge(statement: Statement, flights: Flights) -> Judgement:
     return replace(judge_sense(statement.read, flights), others=others)
 
 
-def judge_sense(read: Read, flights: Flights) -> Judgement:
+def judge_sense(read: Read, flights: CaseFlights) -> Judgement:
     """Return the judgement of one equation in one sense of the text.
 
     The band of a number is that of its reading, of a share of omega_0 that of its tolerances besides, and what half the

@@ -12,7 +12,7 @@ from flipproof.frame.findings import Band, Finding, regression
 from flipproof.paper import claims_figure_5, claims_figures_6_7, claims_figures_8_9
 from flipproof.paper.claims_figures_8_9 import claim_filling_of_change
 from flipproof.paper.experiment import CAVEAT, FREEDOM, Observation, closest_overall, compare_all, standing
-from flipproof.paper.observe import Flights, steady_level
+from flipproof.paper.observe import CaseFlights, steady_level
 from flipproof.paper.runs import (
     BANDS,
     CONTESTANTS,
@@ -125,9 +125,9 @@ def judge_paper(runs: PaperRuns) -> PaperVerdicts:
     )
 
 
-def judge_all(flights: list[Flights]) -> tuple[Statement, ...]:
+def judge_all(flights: list[CaseFlights]) -> tuple[Statement, ...]:
     """Return every statement with its judgements, in the order of the paper."""
-    geometry = [Flights(solver="geometry", made={})]
+    geometry = [CaseFlights(solver="geometry", made={})]
     return tuple(
         replace(each, judgements=tuple(judge(each, by) for by in (geometry if each.of_geometry else flights)))
         for each in CLAIMS

@@ -55,7 +55,7 @@ class Row(NamedTuple):
     why: str
 
 
-class Verdict(NamedTuple):
+class Shown(NamedTuple):
     """What the page shows."""
 
     fillings: tuple[float, ...]
@@ -92,7 +92,7 @@ def claims(found: Water) -> Claims:
         yield observed(f"water-own-inertia-{equation}", title, _finite(change), "of ω₀", note)
 
 
-def verdict(found: Water) -> Verdict:
+def verdict(found: Water) -> Shown:
     """Return the table of the page."""
     wanted = tuple(float(fill) for fill in fluid_band()[0])
     late = late_fluid()
@@ -114,7 +114,7 @@ def verdict(found: Water) -> Verdict:
         )
         for equation, why in EQUATIONS.items()
     )
-    return Verdict(
+    return Shown(
         wanted,
         _ranges(fluid_band()),
         _ranges(recorded_band()),

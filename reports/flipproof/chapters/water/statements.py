@@ -10,7 +10,7 @@ from flipproof.chapters.water.study import OWN_CELLS, own_fluid
 from flipproof.frame.solvers import Made, Run
 from flipproof.paper.cases import family
 from flipproof.paper.experiment import OBSERVATIONS, compare
-from flipproof.paper.observe import Flights
+from flipproof.paper.observe import CaseFlights
 from flipproof.paper.statements import MARKS, Reading
 from slicemodel import Scenario, Trajectory
 
@@ -51,7 +51,7 @@ def standing(statements: tuple[Held, ...]) -> str:
     return f"Without suction our fluid agrees with {of}, with suction with {sucked}."
 
 
-def flights(*, suction: bool) -> Flights:
+def flights(*, suction: bool) -> CaseFlights:
     """Return the recorded flights over the filling; half of the cells tells how sure a number is."""
     fine, coarse = (
         {
@@ -62,7 +62,7 @@ def flights(*, suction: bool) -> Flights:
         for cells in (OWN_CELLS, OWN_CELLS // 2)
     )
     name = NAMES[suction]
-    return Flights(solver=name, made=fine, halved=Flights(solver=name, made=coarse))
+    return CaseFlights(solver=name, made=fine, halved=CaseFlights(solver=name, made=coarse))
 
 
 def _curve(filling: float, cells: int, suction: bool) -> list[float] | None:
