@@ -123,7 +123,8 @@ def output(text: str) -> Path:
 def check_outputs(options: argparse.Namespace, *names: str) -> None:
     """Refuse by a ValueError, before the work begins, files of options that could not be written after it.
 
-    Two options must not name one file, nor one that the command reads; a device or a pipe takes both.
+    No two options may name one file; a device or a pipe takes both. What the command reads is kept by
+    ``refuse_overwriting``.
     """
     taken: dict[Path, str] = {}
     for name in names:

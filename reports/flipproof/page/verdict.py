@@ -177,7 +177,7 @@ def answer(headlines: Sequence[Headline]) -> str:
     weight = "pair" in by_id and by_id["pair"].what == RUNG_NAMES["weightless"]
     solved = "program-eq8" not in by_id or by_id["program-eq8"].value <= PARTING_BAND
     physics = "Eq. 8 lets gravity slide water along the bottle" if weight else "Eq. 8 is not free flight"
-    other = "the paper’s program solves another equation, though in short enough time steps"
+    other = "the paper’s program solves another equation, though with short enough time steps"
     program = ". The program’s time steps are short enough" if solved else f", and {other}"
     water = "for water, half full or more, rods (slices without overlap) are the best guess."
     instead = f"For slices, use free flight; {water}"
@@ -209,7 +209,7 @@ def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
             headline = by_id[id_]
             until = f" {headline.note}" if headline.note and id_ not in ("held", "step") else ""
             yes = "Yes" if headline.value <= PARTING_BAND else "No"
-            yield question, f"{yes}: at worst {words.format(_amount(headline))}{until}."
+            yield question, f"{yes}: up to {words.format(_amount(headline))}{_hidden(headline)}{until}."
 
 
 def _nearer_to_free(by_id: Mapping[str, Headline]) -> bool:
@@ -226,6 +226,12 @@ def verdict(gathered: Gathered) -> dict[str, Any]:
     """Return what a summary holds of the verdict: its lead and its headlines, JSON-ready."""
     numbers = headlines(gathered)
     return {"lead": lead(numbers), "headlines": [headline.to_mapping() for headline in numbers]}
+
+
+def _hidden(headline: Headline) -> str:
+    """Return the band of a number that is smaller than it, in words."""
+    small = headline.band is not None and headline.band > headline.value
+    return f" (numerical uncertainty of the two runs: {percent(headline.band or 0.0)})" if small else ""
 
 
 def _amount(headline: Headline) -> str:
