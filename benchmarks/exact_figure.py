@@ -114,8 +114,8 @@ def line(found: dict[str, list[tuple[float, float]]]) -> str:
     return (
         f"Eq. 8 solved exactly, with all its impacts, takes {1e3 * flow:.1f} ms (N = 100; omega to {100 * left:.0e} %\n"
         f"of omega_0); the published program's thousand steps, interpreted, take {1e3 * program:.0f} ms and differ\n"
-        f"from the equation they converge to by up to {100 * off:.2f} % of omega_0 at the {COMMON + 1} times of this figure "
-        "(above: at all times)."
+        f"from the equation they converge to by up to {100 * off:.2f} % of omega_0 at the {COMMON + 1} times of this "
+        "figure (above: at all times)."
     )
 
 
