@@ -222,7 +222,7 @@ def test_nothing_that_flies_is_refused():
         estimate(Film(label="still", t=t, values=still, quantity="points", lines=np.arange(60)), THROW)
 
 
-def test_every_door_gives_the_same_numbers(tmp_path, poor, capsys):
+def test_every_door_gives_the_same_numbers(tmp_path, poor, capsys, monkeypatch):
     path = written(tmp_path / "film.txt", poor[0])
     throw = tmp_path / "throw.toml"
     throw.write_text(THROW.to_toml(), encoding="utf-8")
@@ -241,11 +241,9 @@ def test_every_door_gives_the_same_numbers(tmp_path, poor, capsys):
     header = next(line for line in (out / "track.csv").read_text().splitlines() if not line.startswith("#"))
     assert header.split(",") == list(SCHEMA)
     assert set(read_curve(out / "track.csv").series) == {"theta", "omega"}
-    measured = hold(read_measured(out / "track.csv"), THROW)
-    best = next(fit for fit in measured.fits if fit.estimate.solver == "free-flight").estimate
-    assert best.best["gamma"] == pytest.approx(poor[1].estimate.best["gamma"], rel=1e-6, abs=0.0)
-    assert measured.fits[0].estimate.solver == "free-flight"
-    assert len(list(measured.findings())) == 3
+    monkeypatch.setattr("flipproof.film.measured.HELD", {"free-flight": "free flight"})  # the others: test_measured.py
+    (one,) = hold(read_measured(out / "track.csv"), THROW).fits
+    assert one.estimate.best["gamma"] == pytest.approx(poor[1].estimate.best["gamma"], rel=1e-6, abs=0.0)
 
 
 def test_films_of_one_bottle_share_drag_and_restitution():

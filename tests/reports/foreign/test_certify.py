@@ -571,7 +571,9 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("fixed_omega_from_differences", "start", "not a slope of theta"),
         ("halving_drag_of_momentum", "angular-momentum", "right without drag: look at the drag"),
         ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
-        ("halving_released_level", "mirror", "right without weight: look at the weight"),
+        pytest.param(
+            "halving_released_level", "mirror", "right without weight: look at the weight", marks=pytest.mark.slow
+        ),
     ],
 )
 def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, advice):
