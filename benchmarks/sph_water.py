@@ -1,7 +1,7 @@
 """Water as particles (SPH), a second fluid that parts where it is pulled: plateaus, swirl, and what is lost.
 
     python benchmarks/sph_water.py                                # a quarter, a half, three quarters full; 4 mm
-    python benchmarks/sph_water.py --spacing 0.008 0.004 0.002    # 2 mm: one or two minutes a flight
+    python benchmarks/sph_water.py --spacing 0.008 0.004 0.002    # 2 mm: one to five minutes a flight
     python benchmarks/sph_water.py --fillings 1 --start irrotational
 
 It shares no line and no method with ``ode_reference.ideal_water``, which it is held against: particles instead of a

@@ -291,7 +291,11 @@ def _answered_without(asked: _Asked) -> str:
         elif answered(replace(ask, scenario=replace(throw, drag=0.0))):
             words, name = "without drag", "drag"
         elif answered(short):
-            words, name = "up to the first impact", "impacts"
+            lively = replace(ask, scenario=replace(throw, gravity=0.0, drag=0.0, restitution=1.0))
+            if answered(replace(lively, start=elsewhere.far_from_ends(throw))):
+                words, name = "as long as no slice rests", "rests"
+            else:
+                words, name = "up to the first impact", "impacts"
     return name and f"; the same is answered {words}: look at {elsewhere.LOOK_AT[name]}"
 
 

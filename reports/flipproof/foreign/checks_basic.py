@@ -60,12 +60,15 @@ def check_start(traits: Traits) -> Making:
     kept = ask is asks[-1] and (worst == "omega" or np.array_equal(answer.omega, answers[0].omega))
     sloped = worst == "omega" and not kept and bound < off[worst] < 0.05
     hint = _of_places(ask, answer) if worst == "r" and answer.r is not None else ""
+    begun = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
+    short = _cut_short(worst, begun[worst][0], float(begun[worst][1][0])) if worst in begun else ""
     return Found(
         holds=off[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
         came=f"{worst} off by {off[worst]:.2g}" + (f", as if it were {late:.2g} s later" if drifted else ""),
         where=f"t = 0 s, theta_0 = {throw.theta0:.3g} rad, omega_0 = {throw.omega0:g} rad/s",
-        advice=("answer at ask.times themselves; " if drifted else "")
+        advice=short
+        + ("answer at ask.times themselves; " if drifted and not short else "")
         + ("omega is that of the instant, not a slope of theta between two times; " if sloped else "")
         + (
             "omega_0 holds from every start: J_0 is that of ask.start, and nothing is kept under the throw; "
@@ -74,6 +77,14 @@ def check_start(traits: Traits) -> Making:
         )
         + (hint or "begin at scenario.theta0, scenario.omega0 and ask.start, with all slices at rest"),
     )
+
+
+def _cut_short(name: str, value: float, answered: float) -> str:
+    """Return that an answer is the value in so few digits, if it is."""
+    for digits in range(2, 10):
+        if answered == float(f"{value:.{digits}g}"):
+            return f"{name}_0 is there with {digits} digits: take the throw over with all of them; "
+    return ""
 
 
 def _of_places(ask: Ask, answer: Answer) -> str:
@@ -275,12 +286,13 @@ def check_angle(traits: Traits) -> Making:
     holds = sizes[0] <= bound or (_falls(sizes, enough) and sizes[-1] <= 100 * bound)
     hint = "" if holds else _own_times(answers[0]) or _jump(asks[0].times, answers[0].omega / THROW.omega0)
     stops = holds and (slow > 100 * max(bound, sizes[0]) or late.theta[-1] == late.theta[-2])
+    halts = _own_times(late) if stops and np.any(np.diff(late.theta[: np.argmax(late.theta)]) == 0.0) else ""
     return Found(
         holds=holds and not stops,
         expected=f"theta - theta_0 = integral of omega within {bound:.1g} rad, or a change that falls with dt",
         came=f"off by {slow:.2g} rad" if stops else f"off by {sizes[0]:.2g} rad{_at_a_quarter(sizes, ' rad')}",
         where=f"flight of {SLOW.duration:g} s" if stops else when(asks[0].times, offs[0]),
-        advice="fly to the last of ask.times, however late that is"
+        advice=halts or "fly to the last of ask.times, however late that is"
         if stops
         else f"{hint}theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a "
         "step with an impact; or the omega answered is not the one by which theta advances",
@@ -328,9 +340,19 @@ def check_definitions(traits: Traits) -> Making:
         expected=f"within {bound:.1g} of those that follow from r",
         came=f"{worst} off by {off[worst].max():.2g}",
         where=when(answer.t, off[worst]),
-        advice="r_cm is the centre of mass of bottle and water from the cap, J that about it with the bottle's own: "
+        advice=_of_decimals(answer)
+        + "r_cm is the centre of mass of bottle and water from the cap, J that about it with the bottle's own: "
         "look at the masses, at the bottle's own inertia, and at where the answer is put together",
     )
+
+
+def _of_decimals(answer: Answer) -> str:
+    """Return that the inertia is printed with few decimals, if it is: in kg m^2 these are few digits."""
+    inertia = answer.inertia
+    for decimals in range(3, 10) if "inertia" in answer.given else ():
+        if inertia is not None and np.array_equal(np.round(inertia, decimals), inertia):
+            return f"inertia has {decimals} decimals, which are few digits: print all digits (%.17g); "
+    return ""
 
 
 def check_velocity(traits: Traits) -> Making:

@@ -568,12 +568,12 @@ def bisected(
 ) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]:
     """Return the sentence that tells right from wrong by one knob, and what to look at."""
     how: Callable[[Sequence[Knobs]], Judging] = lambda all: judging(traits, all, seed, equation, unrefined)  # noqa: E731
-    lost = _wrong_words(judged)
+    lost, together = _wrong_words(judged), TOGETHER if knobs is FULL else ""
     names = [name for name in WORDS if getattr(knobs, name) != getattr(PAPER, name)]
     paper, ice = replace(PAPER, frozen=knobs.frozen), "in ice " if knobs.frozen else ""
     (base,) = yield from how([paper])
     if base.wrong:
-        fields = _field_advice(base)
+        fields = _field_advice(base, ice=knobs.frozen)
         without = "" if knobs.frozen or fields else (yield from simplified(traits, equation, unrefined))
         return f"{ice}{_wrong_words(base)} on the paper's throw, too", f"{without}{fields}"
     single = [_shortened(replace(paper, **{name: getattr(knobs, name)}), seed, FEW_IMPACTS) for name in names]
@@ -583,7 +583,7 @@ def bisected(
         if alone.wrong:
             return (
                 f"{ice}right at {said(PAPER, name)}, wrong at {said(knobs, name)}: {_wrong_words(alone)}",
-                f"{_impact_advice(alone)}{WORDS[name][1]}{_field_advice(alone, '; ')}",
+                f"{together or _impact_advice(alone)}{WORDS[name][1]}{_field_advice(alone, '; ', ice=knobs.frozen)}",
             )
     backs = yield from how([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
     again = [name for name, back in zip(names, backs, strict=True) if not back.wrong and back.share > 0.3]
@@ -594,9 +594,13 @@ def bisected(
         )
         return (
             f"{ice}right at {here}, wrong at {there} where other things are changed, too: {lost}",
-            f"{_impact_advice(judged)}{'; or '.join(WORDS[name][1] for name in again)}{_field_advice(judged, '; ')}",
+            f"{together or _impact_advice(judged)}{'; or '.join(WORDS[name][1] for name in again)}"
+            f"{_field_advice(judged, '; ', ice=knobs.frozen)}",
         )
-    return f"{ice}{lost} where {', '.join(said(knobs, name) for name in names)}", _field_advice(judged)
+    return (
+        f"{ice}{lost} where {', '.join(said(knobs, name) for name in names)}",
+        f"{together or _impact_advice(judged)}{_field_advice(judged, ice=knobs.frozen)}",
+    )
 
 
 def on_the_paper(traits: Traits, equation: str) -> Asking:
@@ -684,20 +688,26 @@ def _wrong_words(judged: Judged) -> str:
     return f"{worst[0]} {is_off} at t = {time:.3g} s{also}{since}"
 
 
+TOGETHER: Final = "slices strike both ends at one instant there: each keeps its own speed times -e, none is left out; "
+
+
 def _impact_advice(judged: Judged) -> str:
-    """Return that impacts come first, where omega is right through some of them and wrong later."""
-    late = judged.passed and "omega" in judged.wrong
+    """Return that impacts come first, where an answer is right through some of them and wrong later."""
     if AT_ONCE in judged.since:
         return "several slices strike at one instant there, and each keeps its own speed times -e; "
+    late = judged.passed and not _field_advice(judged)
     return (
-        "right through some impacts: look first at impacts, their order and number, and at rests and their ends; "
+        "right through some impacts: look first at impacts, their number and order (of several in a step the earliest "
+        "comes first), and at rests and their ends; "
         if late
         else ""
     )
 
 
-def _field_advice(judged: Judged, before: str = "") -> str:
+def _field_advice(judged: Judged, before: str = "", *, ice: bool = False) -> str:
     """Return what to look at by the fields that are wrong, if omega is right: through impacts not by a small error."""
+    if ice and set(judged.wrong) == {"v"}:
+        return f"{before}what is frozen does not move in the bottle: its v is 0 and stays 0"
     if judged.error or "omega" in judged.wrong or (judged.passed and judged.farthest < FAINT / 4):
         return ""
     only = ", ".join(judged.wrong)

@@ -591,10 +591,22 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("at_most_two_hundred_steps", "times", "right where outputs lie close: look at what goes on between two"),
         ("rest_from_a_fiftieth", "refinement", "right through impacts as long as no slice rests: look at rests"),
         ("last_slice_forgotten", "equation", "slice 3 first: look at what is done to it alone"),
+        ("throw_read_to_four_digits", "start", "theta_0 is there with 4 digits: take the throw over"),
+        ("six_decimals", "definitions", "inertia has 6 decimals, which are few digits"),
+        ("whole_steps_only", "angle", "theta stands still between two of the times asked"),
+        *(
+            pytest.param(*each, marks=pytest.mark.slow)
+            for each in (
+                ("only_what_moves_is_struck", "restitution", "look at e at the cap, and at the slices that rest"),
+                ("ice_gathers_speed", "elsewhere", "its v is 0 and stays 0"),
+                ("first_found_is_first", "elsewhere", "of several in a step the earliest"),
+                ("opposite_hits_cancel", "elsewhere", "slices strike both ends at one"),
+            )
+        ),
     ],
 )
 def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    lists = ("first", "second", "fifth", "seventh", "eighth")
+    lists = ("first", "second", "fifth", "seventh", "eighth", "ninth")
     solver = next(each[mistake] for each in map(patches, lists) if mistake in each).solver()
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
