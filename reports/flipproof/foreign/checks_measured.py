@@ -386,10 +386,8 @@ def check_restitution(traits: Traits) -> Making:
         where = f"{worst.end}, struck at {worst.speed:.3g} m/s, t = {worst.time:.4g} s"
         advice = "the speed after an impact, relative to the bottle, is e times the speed before it"
         if {r.end for r in wrong} == {"cap"} and any(r.end == "base" for r in curve):
-            advice += (
-                "; right at the base: look at e at the cap, and at the slices that rest on the base when one strikes "
-            )
-            advice += "the cap, which take part in that impact"
+            advice += "; right at the base: look at e at the cap, and at the slices that rest on the base "
+            advice += "when one strikes the cap, which take part in that impact"
     return Found(holds=not wrong, expected=expected, came=came, where=where, advice=advice, facts=facts)
 
 

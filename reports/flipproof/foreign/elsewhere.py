@@ -689,6 +689,7 @@ def _wrong_words(judged: Judged) -> str:
 
 
 TOGETHER: Final = "slices strike both ends at one instant there: each keeps its own speed times -e, none is left out; "
+"""What to look at where ``FULL`` alone is wrong."""
 
 
 def _impact_advice(judged: Judged) -> str:
