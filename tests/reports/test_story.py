@@ -18,7 +18,7 @@ from slicemodel import Scenario
 SOLVERS = ("published-python", "eq8", "free-flight")
 KEPT = Path(__file__).parents[2] / "reports" / "snapshot" / "summary.json"
 NAMED = re.compile(
-    r"Eqs?\. \d+[a-z]?|\(9[ad]\)|Fig\. \d\w*|1000 (?:<em>)?time steps|r_CM|M_w|≤ 10⁻⁷ %|Up to 1 % counts as small"
+    r"Eqs?\. \d+[a-z]?|\(9[ad]\)|Fig\. \d\w*|1000 (?:<em>)?time steps|r_CM|M_w|≤ 10⁻⁶ %|Up to 1 % counts as small"
     r"|1000 steps|numerical error below 0\.001 %|arXiv:2407\.20627"
 )
 """Digits that are names: of equations and figures, of the published program's steps, and limits that we set."""

@@ -23,7 +23,7 @@ def add_bounce(commands: Any) -> None:
     bounce.add_argument("--dt", type=number, default=1e-3, metavar="S", help="step in seconds (default 0.001)")
     add_json(bounce, "the passports")
     bounce.add_argument(
-        "--plot", type=output, metavar="FILE.png", help="draw the passports, a row an engine (.png or .svg)"
+        "--plot", type=output, metavar="FILE.png", help="draw the passports, one row per engine (.png or .svg)"
     )
 
 

@@ -29,8 +29,8 @@ from flipproof.figures.spoken import inert
 tolerance = reader("a finite number of at least 0", float, lambda value: 0.0 <= value < math.inf)
 
 TOLERANCE_HELP: Final = (
-    "what a finding may move beyond its bands, in its own unit (default 1e-6: round-off of another machine; 0 for the "
-    "same one)"
+    "how far a finding may move beyond its bands, in its own unit (default 1e-6: round-off between machines; use 0 "
+    "on the same machine)"
 )
 
 
@@ -142,19 +142,19 @@ def add_compare(commands: Any) -> None:
     )  # fmt: skip
     compare.add_argument(
         "--columns", type=_names, metavar="x,y", help="compare these columns of two files (.csv, .parquet, .npz or "
-        ".nc; times in t or time) of any system, each in its own unit; so are files without omega, theta and r_cm",
+        ".nc; times in t or time) of any system, each in its own unit; default for files without omega, theta and r_cm",
     )  # fmt: skip
     compare.add_argument(
-        "--twin", type=Path, action="append", default=[], metavar="FILE", help="a run that ought to be A: released a "
-        "late digit aside, or by a coarser step; says until when the two can be compared; may be repeated",
+        "--twin", type=Path, action="append", default=[], metavar="FILE", help="a run that should equal A: its release "
+        "differs in a late digit, or its step is coarser; shows how long A and B can be compared; may be repeated",
     )  # fmt: skip
     compare.add_argument(
         "--twin-of-b", type=Path, action="append", default=[], metavar="FILE", help="a run that ought to be B"
     )
-    compare.add_argument("--from-twins", action="store_true", help="the twins alone say what may differ")
+    compare.add_argument("--from-twins", action="store_true", help="allow only the differences that the twins show")
     compare.add_argument(
-        "--shift", type=tolerance, default=0.0, metavar="S", help="by how much a jump may be early or late (default: "
-        "one step of the output, and what the twins show)",
+        "--shift", type=tolerance, default=0.0, metavar="S", help="time by which a jump may be early or late (default: "
+        "one output step, and what the twins show)",
     )  # fmt: skip
     compare.add_argument("--plot", type=output, metavar="FILE.png", help="draw files' differences (.png or .svg)")
     add_json(compare, "both curves' differences")

@@ -31,8 +31,8 @@ def add_film(commands: Any) -> None:
         commands, "track", "Read a tracked video of a flip and state what it can and cannot show.", command_film
     )
     track.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help="what Tracker's File > Export > Data File wrote, or a "
-        "track.csv",
+        "files", nargs="+", type=Path, metavar="FILE", help="data file exported by Tracker (File > Export > Data "
+        "File), or a track.csv",
     )  # fmt: skip
     _add_film_arguments(track)
     track.set_defaults(kind="track", model=["free-flight"], quantity=None, minutes=10.0)
@@ -45,9 +45,9 @@ def add_film(commands: Any) -> None:
     export.add_argument("--format", choices=("tracker",), default="tracker", help="data track (%(default)s)")
     export.add_argument("--out", type=output, metavar="FILE", help="file to write (default: standard output)")
     export.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
-    export.add_argument("--speed", type=number, metavar="V", help="of C_M at release [m/s] (default: the scenario's)")
-    export.add_argument("--launch-angle", type=number, metavar="DEG", help="of that velocity above the horizontal")
-    export.add_argument("--height", type=number, metavar="M", help="table over the cap at release [m]: stop on landing")
+    export.add_argument("--speed", type=number, metavar="V", help="speed of C_M at release [m/s] (default: scenario's)")
+    export.add_argument("--launch-angle", type=number, metavar="DEG", help="launch angle above the horizontal")
+    export.add_argument("--height", type=number, metavar="M", help="table above the cap at release [m]: stop there")
     export.add_argument("--frame-rate", type=number, default=240.0, metavar="HZ", help="of the video (%(default)g)")
     export.add_argument("--start", type=number, default=0.0, metavar="S", help="time of release in the video (0)")
     export.add_argument(
@@ -59,21 +59,21 @@ def add_film(commands: Any) -> None:
 
     fit = add_command(commands, "fit", "Fit equations to a measured flight and compare them.", command_film)
     fit.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help="as of track, or a CSV with columns t [s] and theta [rad] "
-        "or omega [rad/s] from the release on",
+        "files", nargs="+", type=Path, metavar="FILE", help="a file as for track, or a CSV with columns t [s] and "
+        "theta [rad] or omega [rad/s], starting at release",
     )  # fmt: skip
     _add_film_arguments(fit)
     fit.add_argument(
         "--model", nargs="+", default=["free-flight"], metavar="NAME", help="equations to fit and compare, see "
         "'flipproof models'; midpoint solves eq8 in steps of 0.5 ms (default free-flight)",
     )  # fmt: skip
-    fit.add_argument("--quantity", choices=("points", "theta", "omega"), help="what of a table to fit (points if any)")
+    fit.add_argument("--quantity", choices=("points", "theta", "omega"), help="what to fit (default: points, if any)")
     fit.add_argument(
         "--each", action="store_true", help="every FILE is a film of the same bottle: gamma and restitution are shared"
     )
     fit.add_argument(
-        "--minutes", type=_positive, default=10.0, metavar="M", help="after which a search that has not ended is given "
-        "up, for a slow solver such as mine.py:solve (%(default)g)",
+        "--minutes", type=_positive, default=10.0, metavar="M", help="give up a search after this many minutes; raise "
+        "it for a slow solver such as mine.py:solve (%(default)g)",
     )  # fmt: skip
     fit.set_defaults(kind="fit")
 
@@ -84,7 +84,7 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--length-unit", default="", metavar="UNIT", help="of x and y of an export: m, cm, mm")
     command.add_argument("--time-unit", default="s", metavar="UNIT", help="of t of an export: s, ms (%(default)s)")
     command.add_argument(
-        "--frame-rate", type=number, metavar="HZ", help="of the recording, if t is that of slow motion"
+        "--frame-rate", type=number, metavar="HZ", help="frame rate of the recording, if t is slow motion"
     )
     command.add_argument("--scenario", metavar="THROW.toml", help=f"bottle and water; {SCENARIO_HELP}")
     command.add_argument("--slices", type=count, metavar="N", help="slices of every throw, gamma unchanged (50)")

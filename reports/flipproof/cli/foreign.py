@@ -35,8 +35,8 @@ def add_foreign(commands: Any) -> None:
         commands, "certify", "Test a solver with the conformance suite, one line per check.", command_certify
     )
     _add_spec(certify)
-    certify.add_argument("--equation", metavar="E", help="hold it to this equation, whatever it declares")
-    said = certify.add_argument_group("of a cmd: or csv: solver, which cannot say it of itself")
+    certify.add_argument("--equation", metavar="E", help="test the solver against this equation, whatever it declares")
+    said = certify.add_argument_group("for a cmd: or csv: solver, which cannot declare these itself")
     said.add_argument("--name", help="its name")
     said.add_argument("--refined-by", choices=("dt", "steps", "rtol"), help="what its effort is")
     said.add_argument(
@@ -45,7 +45,7 @@ def add_foreign(commands: Any) -> None:
         help="of its arithmetic, or of what it prints",
     )
     said.add_argument("--order", type=float, metavar="P", help="order of its error before impacts")
-    certify.add_argument("--seed", type=int, metavar="K", help="draw other throws for the check elsewhere")
+    certify.add_argument("--seed", type=int, metavar="K", help="seed of the random throws of the check elsewhere")
     add_json(certify, "the passport (traits, results, versions)")
     certify.add_argument("--junit", type=output, metavar="FILE", help="write the verdicts as JUnit XML")
     certify.add_argument("--badge", type=output, metavar="FILE", help="draw verdict and domain as SVG, for a README")
@@ -100,7 +100,7 @@ def _add_spec(command: argparse.ArgumentParser) -> None:
         "--timeout", type=count, metavar="S", help="seconds one run may take (default: as it declares)"
     )
     command.add_argument(
-        "--memory", type=count, metavar="MB", help="megabytes it may take (default: half of the machine's)"
+        "--memory", type=count, metavar="MB", help="megabytes one run may take (default: half of the machine's)"
     )
 
 

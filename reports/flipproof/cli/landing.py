@@ -39,8 +39,8 @@ def add_landing(commands: Any) -> None:
     land.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     where = land.add_mutually_exclusive_group()
     where.add_argument(
-        "--height", type=number, metavar="M", help="table over the place of the cap at release [m] (default: where the "
-        "bottle would touch it standing after the throw's duration)",
+        "--height", type=number, metavar="M", help="height of the table above the cap at release [m] (default: the "
+        "bottle, if upright, touches it at the end of the throw's duration)",
     )  # fmt: skip
     where.add_argument("--aim", choices=("A", "B"), help="solve for a throw that touches upright; see 'upright'")
     _add_table(land)

@@ -174,9 +174,7 @@ def parser() -> argparse.ArgumentParser:
         "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
         "number if smaller)",
     )  # fmt: skip
-    add_guests(
-        report, "certify another solver and hold it against all others; a check that it fails is a claim that fails"
-    )
+    add_guests(report, "certify another solver and hold it against all others; a failed check is a failed claim")
     report.add_argument(
         "--measured", type=Path, metavar="TRACK.csv", help="a measured flight to hold beside the solvers: a track of "
         "'flipproof track', or a CSV with t and theta or omega from release to landing",

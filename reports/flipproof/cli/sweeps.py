@@ -30,7 +30,7 @@ def add_sweeps(commands: Any) -> None:
     drawn = add_command(commands, "map", "Map which mistake matters where, or resume the map.", command_map)
     drawn.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     drawn.add_argument(
-        "--axis", choices=("gamma", "step", "restitution"), required=True, help="what varies beside the fill fraction"
+        "--axis", choices=("gamma", "step", "restitution"), required=True, help="what varies besides the fill fraction"
     )
     drawn.add_argument(
         "--size", type=size, default=(20, 20), metavar="CxR", help="fill fractions by values of the axis (20x20)"
@@ -77,8 +77,8 @@ def add_store(command: argparse.ArgumentParser) -> None:
     where = command.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     where.add_argument(
-        "--executor", type=_executor, metavar="MODULE:FACTORY", help="makes the concurrent.futures.Executor that does "
-        "the work, MODULE:FACTORY@ARGUMENT of an argument; Dask: distributed:Client@tcp://127.0.0.1:8786",
+        "--executor", type=_executor, metavar="MODULE:FACTORY", help="factory of the concurrent.futures.Executor to "
+        "use; with an argument, MODULE:FACTORY@ARGUMENT; Dask: distributed:Client@tcp://127.0.0.1:8786",
     )  # fmt: skip
     command.add_argument("--export", type=output, metavar="FILE", help="when complete, write all rows to a .csv or .nc")
     command.add_argument("--quiet", action="store_true", help="no progress")

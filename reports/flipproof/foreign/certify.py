@@ -310,9 +310,7 @@ def _enough(results: Iterable[Result]) -> Result:
     elif 2 * len(kept) <= len(made):
         advice = f"not enough to judge: {len(made) - len(kept)} of {len(made)} are declared to fail"
     else:
-        advice = (
-            "not enough to judge: declare equation, refined_by and order where there are any, and answer r and v, too"
-        )
+        advice = "not enough to judge: declare equation, refined_by and order if they apply, and answer r and v, too"
     title = "Half of the checks could be made, and are not expected to fail."
     if waiting := sum(r.verdict == WAITING for r in meant):
         return Result(check=ENOUGH, verdict=WAITING, title=title, reason=f"{waiting} of {len(meant)} checks wait")

@@ -71,7 +71,7 @@ def check_start(traits: Traits) -> Making:
         + ("answer at ask.times themselves; " if drifted and not short else "")
         + ("omega is that of the instant, not a slope of theta between two times; " if sloped else "")
         + (
-            "omega_0 holds from every start: J_0 is that of ask.start, and nothing is kept under the throw; "
+            "omega(0) is omega_0 from every start: compute J_0 from ask.start, and cache nothing by throw; "
             if kept
             else ""
         )
@@ -83,7 +83,7 @@ def _cut_short(name: str, value: float, answered: float) -> str:
     """Return that an answer is the value in so few digits, if it is."""
     for digits in range(2, 10):
         if answered == float(f"{value:.{digits}g}"):
-            return f"{name}_0 is there with {digits} digits: take the throw over with all of them; "
+            return f"{name}_0 has only {digits} digits: read the throw with all its digits; "
     return ""
 
 

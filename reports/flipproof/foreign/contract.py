@@ -325,7 +325,8 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
     broken = arrays["slice"] % 1.0 != 0.0
     if broken.any():
         raise AnswerError(
-            f"impacts.slice{_first(broken)} = {arrays['slice'][broken][0]:g} is no whole number in [0, {n_slices - 1}]"
+            f"impacts.slice{_first(broken)} = {arrays['slice'][broken][0]:g} is not a whole number in "
+            f"[0, {n_slices - 1}]"
         )
     return Impacts(**arrays)  # type: ignore[arg-type]
 

@@ -138,7 +138,7 @@ UNREFINED: Final = 0.003
 
 WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "restitution": ("e = {:.3g}", "take the restitution from the throw, at both ends and also when it is 0 or 1"),
-    "slices": ("N = {}", "every slice moves, also the ninth, the last one of a loop over blocks, and a single one"),
+    "slices": ("N = {}", "every slice must move: the ninth, the last of a loop over blocks, and the only one of N = 1"),
     "start": (
         "slices that start {}",
         "begin at ask.start, in the order in which it stands there, which need not be a stack",
@@ -662,7 +662,7 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
         if name in right:
             return f"{right_without(name)}{since}"
     if "all" in right:
-        return f"right without weight, drag and impacts, and wrong without any single one of them; {since}"
+        return f"right without weight, drag and impacts together, but wrong if only one of them is removed; {since}"
     too = "wrong before the first impact without weight and drag, too"
     (apart,) = yield from judging(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
     if not apart.wrong:

@@ -94,8 +94,8 @@ class Place:
         """What was found, in sentences."""
         if self.still:
             return (
-                f"{self.solver}: omega stays constant within {self.moved:.1g}: nothing moves inside the "
-                "bottle, which no equation of the ladder says"
+                f"{self.solver}: omega stays constant within {self.moved:.1g}, as if nothing moved inside the "
+                "bottle; no equation of the ladder gives that"
             )
         own = "it cannot be refined" if self.change is None else f"its own change under refinement is {self.change:.2g}"
         nearest = f"{self.equation} at {self.distance:.2g} of omega_0 ({own})"

@@ -23,7 +23,7 @@ TERMS: Final[Mapping[str, str]] = {
     "r_CM": "Distance of the centre of mass from the cap, along the axis of the bottle.",
     "v_CM": "Speed of the centre of mass along the axis of the bottle, as seen from the bottle.",
     "N": "Number of slices that the water is cut into.",
-    "M̃": "Filling: mass of the water divided by the mass that fills the bottle.",
+    "M̃": "Filling: mass of the water divided by the mass of water that fills the bottle.",
     "restitution": "Speed of a slice after it strikes an end, divided by its speed before; e = 0 sticks, e = 1 "
     "bounces without loss.",
     "slice": "One of N equal parts of the water, treated as a point that slides along the axis; slices pass "
@@ -57,13 +57,13 @@ TERMS: Final[Mapping[str, str]] = {
     "our equations.",
     "fair share": "What a change does to a result, as the mean over all orders in which all the changes can be "
     "made; the fair shares sum to the whole.",
-    "band": "An estimate of how far a number could move by numerical causes alone: eight flights whose release "
-    "differs in the eleventh digit, or finer settings. It is no bound.",
+    "band": "An estimate, not a bound, of how far a number could move by numerical causes alone: from eight flights "
+    "whose release differs in the eleventh digit, or from finer settings.",
     "recoil": "The kick that the bottle gets when a slice strikes one of its ends.",
     "certified": "Neither half the step nor twice the iterations moves ω by more than the tolerance, and "
-    "rebounds are as asked.",
+    "every rebound has the restitution asked for.",
     "regression claim": "A statement that must hold in every report; if one fails, the report's exit status is 1.",
-    "observation": "A number that was measured and is reported; it cannot fail.",
+    "observation": "A number that is reported without a threshold; it cannot fail.",
     "ice": "Frozen water: no slice may move, so ω must stay constant.",
     "impact": "A slice strikes an end of the bottle.",
 }  # fmt: skip

@@ -112,7 +112,7 @@ def test_impacts_come_as_rows_columns_or_mappings():
         ([(0.1, 0, 1)], "impacts are no rows"),
         ([(0.1, 0, 2, 1.0, 0.5)], "impacts.end holds other numbers"),
         ([(0.1, -1, 1, 1.0, 0.5)], "impacts.slice leaves"),
-        ([(0.1, 0, 1, 1.0, 0.5), (0.2, 0.5, 1, 1.0, 0.5)], r"impacts.slice\[1\] = 0.5 is no whole number in \[0, "),
+        ([(0.1, 0, 1, 1.0, 0.5), (0.2, 0.5, 1, 1.0, 0.5)], r"impacts.slice\[1\] = 0.5 is not a whole number in \[0, "),
         ([(math.nan, 0, 1, 1.0, 0.5)], r"impacts.time\[0\] = nan is not finite"),
     ],
 )

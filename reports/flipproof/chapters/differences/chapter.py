@@ -208,9 +208,9 @@ def figures(results: Differences) -> Iterator[Exhibit]:
         name="differences",
         title="Where the solvers part",
         caption="Each panel shows the difference in ω of one pair of solvers as a share of ω₀, on one logarithmic "
-        "scale for all. The dotted line stands at 1 % of ω₀, the point at the moment when the difference first exceeds "
-        "it. The largest value of a panel belongs to its pair. It is no share of the difference between program and "
-        "free flight: such shares stand in the waterfall.",
+        "scale for all. The dotted line is at 1 % of ω₀; the point marks when the difference first exceeds "
+        "it. The largest value of a panel describes its pair alone; it is not a share of the difference between "
+        "program and free flight. The waterfall gives such shares.",
         alt=f"Logarithmic line plots of the differences in omega, one panel a pair. {words}.".replace("ω₀", "omega_0"),
         maker=draw,
         data=(results.pairs,),

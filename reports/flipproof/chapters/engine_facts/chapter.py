@@ -268,11 +268,11 @@ def _tunnel(_: Mapping[str, Made]) -> tuple[float, str]:
 
 WORDS: Final = {
     "gravity": "gravity changes nothing in free flight: largest change of ω(t) when it is switched off",
-    "smaller-step": f"with {FEW_ITERATIONS} iterations a tenth of the step explodes sooner: quotient of the times it "
-    "holds",
+    "smaller-step": f"with {FEW_ITERATIONS} iterations a tenth of the step explodes sooner: ratio of the times until "
+    "it explodes",
     "order": f"the order in which bodies enter matters: largest change of ω(t), {FEW} iterations",
-    "order-forgotten": f"a solver that converges forgets the order: that change at {MANY} iterations over "
-    f"that at {FEW}",
+    "order-forgotten": "a solver that converges forgets the order: largest change of ω(t) at "
+    f"{MANY} iterations over that at {FEW}",
     "joints": "joints give: how far a mass leaves the axis that a joint holds it on, default correction",
     "elasticity": "elasticities multiply: restitution of two shapes of 0.5 each",
     "groove-end": "the end of a groove is a dead stop whatever the elasticity: speed back over speed before",

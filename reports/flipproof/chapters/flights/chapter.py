@@ -101,8 +101,8 @@ def figures(results: Flown) -> Iterator[Exhibit]:
         flights,
         "omega",
         "Angular velocity",
-        caption="The published program and its limit Δt → 0, and the exact step and Eq. 8, are each a scheme and the "
-        "equation that it solves: they differ by what a finite time step does. pymunk throws the bottle of free flight "
+        caption="Two pairs are a scheme and the equation that it solves, and differ by the effect of a finite time "
+        "step: the published program and its limit Δt → 0, and the exact step and Eq. 8. pymunk computes free flight "
         "by its own mechanics. Any other two curves solve different equations. All have "
         f"N = {flights[0].scenario.n_slices} slices.",
         alt="Line plot of omega over omega_0 against time, 1 at release. Values at the end: {}.",
@@ -125,8 +125,8 @@ def figures(results: Flown) -> Iterator[Exhibit]:
         flights,
         "centre-of-mass",
         "Centre of mass",
-        caption="Distance from the cap. The nearer to the cap the centre of mass is on landing, the easier the bottle "
-        "topples; in ice it stays where it is.",
+        caption="Distance of the centre of mass from the cap. The smaller it is on landing, the more easily the bottle "
+        "topples; in a bottle of ice it is constant.",
         alt="Line plot of the centre of mass from the cap, as a fraction of the length, "
         f"{flights[0].r_cm[0] / length:.3f} at release. At the end: {{}}.",
         column="r_CM/L {} [1]",

@@ -151,10 +151,10 @@ def figures(results: Frozen) -> Iterator[Exhibit]:
     yield Exhibit(
         name="frozen",
         title="What holding the coefficients constant costs, step by step",
-        caption="Top: how much each quantity that is held constant changes within a step. Middle: the velocity that "
-        "holding it constant misses in that step, with a marker at the largest value of each; v_CM jumps at every "
-        "impact, so that a band shows the range of what holding it misses. Bottom: the missed velocities added up, "
-        "beside the error of the velocity and of ω that they lead to."
+        caption="Top: how much each quantity that is held constant changes within a step. Middle: the velocity "
+        "missed in that step because the quantity is held constant, with a marker at the largest value of each; v_CM "
+        "jumps at every impact, so a band shows the range for it. Bottom: the sum of the missed velocities, "
+        "and the errors of the velocity and of ω."
         + ("" if results.explained is None else explained.format(results.explained)),
         alt=f"Curves over time for exact-step at a step of {results.dt * 1e3:.2g} ms. Share of the steps in which "
         f"freezing costs most: {shares}. Largest velocity missed in one step: {peaks or 'none'}. Largest error of "

@@ -60,8 +60,8 @@ def figures(found: Sequence[Visit]) -> Iterator[Exhibit]:
             yield Exhibit(
                 name=f"guest-{visit.guest.slug}-waterfall",
                 title=f"From {visit.guest.label} to free flight",
-                caption="Left: from the guest's mean of ω/ω₀ over the second half to that of free flight. The rest "
-                "leads to the equation that the guest solves, and no assumption explains it; its error bar is the "
+                caption="Left: from the guest's mean of ω/ω₀ over the second half to that of free flight. The bar “the "
+                "rest” leads to the equation that the guest solves; no assumption explains it; its error bar is the "
                 "guest's own band. Every other bar is the fair share of an assumption of that equation, the mean over "
                 "all orders of mending them. Right: the same in single orders; where the marks lie apart, assumptions "
                 "interact. Below the dotted line: what forbidding overlap changes, no share.",
@@ -84,8 +84,8 @@ def _draw_convergence(visits: Sequence[Visit]) -> Exhibit:
         name="guests-convergence",
         title="What refinement buys each guest",
         caption="Largest difference in ω to the guest's own equation, or to the nearest if it declares none, against "
-        "its effort relative to the coarsest run. A curve that levels off has met another equation, another parameter, "
-        "or its arithmetic. Seconds are by the clock while other runs were made on the same machine.",
+        "its effort relative to the coarsest run. A curve levels off where another equation, another "
+        "parameter or round-off limits it. Seconds are wall-clock time, with other runs on the same machine.",
         alt=f"Log-log plot of error against effort. {'; '.join(words)}.",
         maker=figure_convergence,
         data=(visits,),

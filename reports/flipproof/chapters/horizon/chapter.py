@@ -240,11 +240,11 @@ def figures(results: tuple[Horizon, ...]) -> Iterator[Exhibit]:
     yield Exhibit(
         name="horizon",
         title="Up to when ω(t) means anything",
-        caption="Each curve is the width of an ensemble: how far apart the ω of flights are that should be one flight. "
-        "They differ in arithmetic alone, by the angle of release (thin), which free flight does not feel, or by the "
-        "order in which bodies entered the engine (black); or their release differs (thick). Where curves of other "
-        "changes jump to one level, an impact happens in some of the flights and not in the others; differences in ω "
-        "below that level mean nothing.",
+        caption="Each curve is the width of an ensemble: the largest distance in ω between flights that should be "
+        "one flight. The flights differ in arithmetic alone, by the angle of release (thin), which free flight does "
+        "not feel, or by the order in which bodies entered the engine (black); or their release differs (thick). Where "
+        "curves of different changes jump to one level, an impact happens in some of the flights only; differences "
+        "in ω below that level mean nothing.",
         alt="Logarithmic plots of the width of ensembles over time. "
         + ". ".join(words).replace("ω₀", "omega_0").replace("θ₀", "theta_0"),
         maker=figure_horizon,

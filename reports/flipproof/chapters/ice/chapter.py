@@ -134,7 +134,7 @@ def figures(results: Ice) -> Iterator[Exhibit]:
         title="Ice keeps its angular velocity",
         caption="Nothing moves in a bottle of ice, so that every drift is an error of the solver; the largest value "
         "stands in the legend. In an engine the slices of ice are masses held by joints, which yield a little at the "
-        "start; at half the step they yield a quarter as much.",
+        "start; at half the step they yield about a quarter as much.",
         alt=f"Logarithmic plot of the drift of omega over omega_0 in a bottle of ice. Largest drift: {words}.",
         maker=draw,
         data=(drifts,),

@@ -78,7 +78,7 @@ def _water_and_ice(results: LandingStudy) -> Iterator[Finding]:
         others = {KINDS[kind].words: results.cell(kind, filling) for kind in WATER[1:]}
         laws = ", ".join(f"{law} {cell.share.value:.3f}" for law, cell in others.items() if cell is not None)
         verdict = _judged(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
-        title = f"P(upright) of water minus ice at filling {filling:g} (abstract, section 3: redistribution helps)"
+        title = f"P(upright), water minus ice, at filling {filling:g} (abstract, section 3: redistribution helps)"
         note = f"{verdict}; law together; {laws}; {results.assumed}"
         band = Band((high - low) / 2, "sample")
         yield observed(f"landing-water-minus-ice-{filling:g}", title, difference, "", note, band=band)
@@ -100,15 +100,15 @@ def _best_filling(results: LandingStudy) -> Finding:
     difference, low, high = best[1].minus(other[1])
     note = (
         f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; "
-        f"difference {difference:+.3f}, {_judged(low, high, ('decided', 'decided', 'not decided'))}; the interval "
-        f"holds for fillings named beforehand, and these two were chosen by the throws it is made of; {results.assumed}"
+        f"difference {difference:+.3f}, {_judged(low, high, ('decided', 'decided', 'not decided'))}; the interval is "
+        f"valid for fillings fixed beforehand, but these two were chosen from the same throws; {results.assumed}"
     )
     return observed(name, title, max(curve, key=share)[0], note=note)
 
 
 def _static(results: LandingStudy) -> Iterator[Finding]:
     """Yield how often the static criterion says the outcome rightly (section 6, Eq. 13a)."""
-    title = "Throws of which the toppling angle at the touch says rightly whether they stand: "
+    title = "Share of throws whose outcome the toppling angle at the touch predicts correctly: "
     for (family, kind), (said, others) in results.static.items():
         if throws := said.throws + others.throws:
             id_ = f"landing-static-{family}-{kind.replace(', ', '-')}"
@@ -152,12 +152,12 @@ def _model_uncertainty(results: LandingStudy) -> Finding:
 
 def _undecided(results: LandingStudy) -> Finding:
     """Return how many landings of the reference could not be certified; a regression of the paper's throw alone."""
-    name, title = "landing-undecided", "Landings of the reference that no certificate decides"
+    name, title = "landing-undecided", "Share of landings of the reference that no certificate decides"
     shares = [cell.share for key, cell in results.cells.items() if key.kind in ("together", "in-turn", "ice")]
     throws, unknown = sum(share.throws for share in shares), sum(share.undecided for share in shares)
     if not throws:
         return observed(name, title, None, note="nothing was thrown")
-    note = f"{unknown} of {throws}; they count both ways in every interval"
+    note = f"{unknown} of {throws}; every interval allows them to be upright or not"
     if results.throw.with_slices(REFERENCE.n_slices) != REFERENCE:
         return observed(name, title, unknown / throws, note=note)
     return regression(name, title, unknown / throws, "", (0.0, 0.01), note)
@@ -169,8 +169,8 @@ def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
         (one, other), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
         kind = "ice" if case["law"] is None else f"water-{case['law']}"
         most = 0.03
-        title = f"Outcomes in which {one} and {other} differ from one touch: {kind.replace('-', ', ')}"
-        note = f"{differ} of {both} decided by both; at most {most:.0%} is asked for: "
+        title = f"Share of touches from which {one} and {other} differ in outcome: {kind.replace('-', ', ')}"
+        note = f"{differ} of {both} that both decide; at most {most:.0%} is required: "
         share = differ / both if both else None
         reached = share is not None and share <= most
         note += f"{'reached' if reached else 'missed'}; stored, made by: {stored['command']}"

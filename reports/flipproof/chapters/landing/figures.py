@@ -76,7 +76,7 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             "landing-axes",
             "What the share depends on",
             f"Share of throws that end upright at filling {size.axis_filling:g}, along each assumption, with the "
-            f"others as they are; {size.axis_throws} throws a point, the same along an axis. Each axis has its own.",
+            f"others as they are; {size.axis_throws} throws a point. All points of an axis share the same throws.",
             "; ".join(
                 f"P(upright) of water along {axis}: "
                 + ", ".join(f"{value:g}: {cell.share.value:.2f}" for value, cell in results.along(axis, "together"))
@@ -89,8 +89,8 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             "landing-static",
             "Where the static criterion is right and wrong",
             "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
-            "down at rest would come upright. Each bar is the share that does end upright, of all throws that the "
-            "angle calls upright and of all others, at all fillings.",
+            "down at rest would end upright. Each bar is the share of throws that do end upright, at all fillings: "
+            "of those that the angle calls upright, and of the others.",
             "; ".join(
                 f"family {family}, {kind}: {said.upright} of {said.throws} called upright stand, {others.upright} of "
                 f"{others.throws} others"
@@ -102,8 +102,8 @@ def figures(results: LandingStudy) -> list[Exhibit]:
         exhibit(
             "landing-energy",
             "Energy against the saddle",
-            f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the energy does "
-            "not suffice to get from the base over a rim, and the outcome is final.",
+            f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the bottle has "
+            "too little energy to tip from the base over a rim, and the outcome is final.",
             _energy_words(results),
             figure_energy,
             energies_csv(results),

@@ -188,10 +188,10 @@ def figures(found: Found) -> Iterator[Exhibit]:
         name="overlap",
         title="How far ω falls because slices may overlap",
         caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
-        "down. In the same engine, slices that are rods and exclude each other keep the angular velocity of a full "
-        "bottle. The two curves differ by what overlap does. Water as one stretching column cannot overlap either, and "
-        "has no parameter to choose; free flight minus the column is what overlap changes between two exact equations. "
-        f"That is a difference of two models, free flight at N = {study.throw.n_slices}, and no share{most}. Rods "
+        "down. In the same engine, slices that exclude each other keep the angular velocity of a full "
+        "bottle. The two curves differ by the effect of overlap. Water as one stretching column cannot overlap either, "
+        "and has no free parameter. Free flight minus the column is a difference of two exactly solved models (free "
+        f"flight at N = {study.throw.n_slices}) and not a share{most}. Rods "
         "are infinitely many slices that exclude each other and do not bounce. In the "
         "paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of 0.1 turns like ice. Bars: "
         "twice what halving the step changes.",

@@ -258,8 +258,8 @@ def figures(panels: Sequence[Panel]) -> Iterator[Exhibit]:
     caption = (
         f"Every cell is a flight of {panels[0].layout.duration:g} s, held against event-driven free flight; its sign "
         f"says the same as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} "
-        f"iterations (dashed) {default.count('explodes')} explode; their times from left to right show that a finer "
-        "step does not help. Where a column reads the same from some row upwards, more iterations no longer change "
+        f"iterations (dashed) {default.count('explodes')} explode; their times from left to right show whether a "
+        "finer step helps. Where a column reads the same from some row upwards, more iterations no longer change "
         "anything, and only a shorter step does."
     )
     yield Exhibit(

@@ -235,8 +235,8 @@ def figures(results: Orders) -> Iterator[Exhibit]:
         name="step-size",
         title="Error against step size",
         caption="Points parallel to the dotted slope mean that halving the step halves the error. The shaded range is "
-        f"that of the {PHASES} grids averaged in each point: other steps, other impact phases, because a rebound waits "
-        "for the grid. A scheme that converges does so to its own equation, not to free flight.",
+        f"that of the {PHASES} grids averaged in each point: their steps differ a little, and so does the time that a "
+        "rebound waits for the grid. A scheme that converges does so to its own equation, not to free flight.",
         alt=f"Two log-log plots of error against step. {words}",
         maker=figure_step_size,
         data=(studies, starts),

@@ -32,14 +32,15 @@ from ode_reference.solver import COLUMN, RODS
 from slicemodel.trajectory import FloatArray
 
 LIMITS: Final = (
-    "May be said: from three quarters full on, overlap is refuted. At a half the plateau of Eq. 8 lies outside "
-    "whatever start the water had. From a half on all equations spread the water too early, having no suction. The "
+    "May be said: from three quarters full on, these fluids contradict overlap. At half full the plateau of Eq. 8 "
+    "lies outside their range for every start of the water. From half full on all equations, which have no suction, "
+    "spread the water too early. The "
     "recorded grid keeps more spin than ours, from a half to three quarters: it lets swirl rub off on the bottle. "
-    "A full bottle of water without vorticity must keep its ω; within half a second that was off by 5 % in the "
+    "A full bottle of water without vorticity must keep its ω; within half a second ω was off by 5 % in the "
     "recorded grid (16 cells), by 19 % in the recorded particles (4 mm), by 1.1 % in ours (16 cells). May not be "
     "said: that these fluids are real water; any level better than 0.05 ω₀ for their numerics, or than 0.1 ω₀ for "
     "the start of the water, which no hand controls; anything at a filling of 0.1; that an equal plateau is equal "
-    "physics. No measured track is public."
+    "physics. We know of no public measured track."
 )
 """What may be concluded, and what not."""
 
@@ -153,10 +154,11 @@ def figures(found: Water) -> Iterator[Exhibit]:
     yield Exhibit(
         name="water",
         title="Which equation comes nearest to water, by filling",
-        caption="Mean of ω/ω₀ over the second half of the flight of the paper's own bottle. Shaded: what two crude "
-        "fluids gave, with suction and without, at their resolutions; hatched: our own ideal water, likewise; bars: "
-        "two fluids over the starts of their water. Below a quarter the fluids disagree, and from a half to three "
-        "quarters ours keeps less spin than the recorded grid. No fluid is thrown for this figure: all are recorded.",
+        caption="Mean of ω/ω₀ over the second half of the flight of the paper's own bottle. Shaded: range of two "
+        "crude fluids, with and without suction, at all their resolutions; hatched: the same for our own ideal water; "
+        "bars: range of the two fluids over the starts of their water. Below a quarter full the fluids disagree; from "
+        "a half to three quarters ours keeps less spin than the recorded grid. All fluids are recorded, not computed "
+        "for this report.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction. Fluids {band}. {told}.",
         maker=figure_water,
         data=(found,),

@@ -134,12 +134,12 @@ def figures(study: WorkPrecision) -> Iterator[Exhibit]:
     yield Exhibit(
         name=f"work-precision-{NAME}",
         title=f"What a digit costs: {TITLE}",
-        caption="Farther left is cheaper, farther down is better; p is the order in cost: the error halves p times as "
-        "work doubles. Each panel holds one equation and those who solve it, so that what lies between equations does "
+        caption="Farther left is cheaper, farther down is better; p is the order in cost: doubling the work divides "
+        "the error by 2^p. Each panel holds one equation and its solvers, so that differences between equations do "
         "not enter. Solid: schemes, by their steps; dashed: methods, by their tolerance; dotted: engines, by their dt. "
         "In the grey nothing is claimed: there the reference itself is uncertain; a hollow mark lies at that floor. "
-        "A cross at the top edge is a run that failed; the table says why. An update of one slice is counted the same "
-        "on every machine, but is not the same work to everyone.",
+        "A cross at the top edge is a run that failed; the table says why. The number of slice updates is the "
+        "same on every machine, but one update costs solvers different work.",
         alt="Log-log plots of error, of omega_0, against updates of one slice. "
         f"From the first level to the last: {levels}. Floors: {floors}.",
         maker=figure_work_precision,
