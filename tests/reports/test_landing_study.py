@@ -396,7 +396,7 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
 
 def test_the_best_filling_is_said_to_be_chosen_by_its_own_throws(found):
     (finding,) = (each for each in claims(found) if each.id == "landing-best-filling")
-    assert "these two were chosen by the throws it is made of" in finding.note
+    assert "these two were chosen from the same throws" in finding.note
 
 
 @pytest.mark.parametrize(("of_ice", "verdict"), [(2.0, "holds"), (1.4, "cannot be decided"), (0.0, "fails")])

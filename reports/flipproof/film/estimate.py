@@ -165,11 +165,13 @@ def estimate(
         made += flights
         tick(flights)
 
-    starts = _start(film, known, held)
+    starts = [(likelihood, x) for _, likelihood, x in _start(film, known, held)]
     reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, x in starts) + 0.5  # the touch may turn out later
     equation = Equation(solver, known, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
     likelihood, x = starts[0] if len(starts) == 1 else _chosen(starts, equation)
     likelihood, grid, complete = _closed_in(likelihood, equation, x, seconds)
+    if not np.isfinite(grid.masses).any():
+        raise NoFlightError(f"{film.label}: {solver}: no flight fits the clicks; check that y points up")
     if complete:
         grid = _refined(likelihood, equation, grid, began + seconds)
     fits, curves = grid.fits, grid.curves
@@ -470,14 +472,30 @@ def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
 # ---------------------------------------------------------------------- the start
 
 
-def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, FloatArray]]:
-    """Return first guesses, the likeliest first: a likelihood with a touch, and the inner parameters.
+def exchange_gain(film: Film, throw: Scenario, held: Held) -> float:
+    """Return by how much the log posterior of the first guess grows if cap and base are exchanged.
+
+    Of some 80 frames of the film, evenly chosen; -inf if one of the two has no flight in it, or the film no points.
+    """
+    if film.quantity != "points":
+        return -math.inf
+    some = slice(None, None, max(1, len(film.t) // 80))
+    part = replace(film, t=film.t[some], values=film.values[:, some], lines=film.lines[some])
+    try:
+        costs = [_start(one, throw, held)[0][0] for one in (part, replace(part, values=part.values[::-1].copy()))]
+    except NoFlightError:
+        return -math.inf
+    return costs[0] - costs[1]
+
+
+def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelihood, FloatArray]]:
+    """Return first guesses, the likeliest first: its cost, a likelihood with a touch, and the inner parameters.
 
     Every frame may be the release: the turning that follows is held against free flight with little, some and much
     drag, and those that stay with it, and with a parabola, are taken.
     """
     if film.quantity != "points":
-        return [_start_table(film, held)]
+        return [(0.0, *_start_table(film, held))]
     theta, t = film.angle, film.t
     known = np.flatnonzero(~np.isnan(theta))
     if len(known) < 8:
@@ -529,7 +547,7 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[Likelihood, Fl
     polished = [
         min((_better(one[1], curve, one[2]) for curve in every), key=lambda other: other[0]) for one in apart_by
     ]
-    return [(one[1], one[2]) for one in sorted(polished, key=lambda one: one[0])]
+    return sorted(polished, key=lambda one: one[0])
 
 
 def _off_gravity(x: FloatArray) -> float:

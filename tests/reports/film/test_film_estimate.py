@@ -8,9 +8,9 @@ import pytest
 
 from flipproof.cli.main import main
 from flipproof.film.clip import SCHEMA, read_film
-from flipproof.film.estimate import NoFlightError, estimate, shortest
+from flipproof.film.estimate import NoFlightError, estimate, exchange_gain, shortest
 from flipproof.film.fall import before
-from flipproof.film.judge import Judged, UnsoundError, together
+from flipproof.film.judge import EXCHANGED, Judged, UnsoundError, together
 from flipproof.film.likelihood import Film, Held
 from flipproof.film.measured import hold, read_measured
 from flipproof.output.tables import read_curve
@@ -212,6 +212,24 @@ def test_an_estimate_that_begins_in_free_flight_is_refused():
     moved = replace(one, draws=one.draws | {"release": one.draws["release"] + 0.12})
     with pytest.raises(UnsoundError, match="falls freely by its clicks alone: the flight begins earlier"):
         Judged(moved)._check_release()
+
+
+@pytest.mark.parametrize(("fps", "model"), [(30, "free-flight"), (60, "eq8")])
+def test_exchanged_ends_are_refused_whatever_flight_is_found_in_them(fps, model):
+    """The search would leave the beginning to the hand, and find a late release with a spin far too slow."""
+    film = film_of(clip(3, fps=fps, tilt=3.0, model=model))
+    assert exchange_gain(film, THROW, Held()) < -EXCHANGED
+    exchanged = replace(film, values=film.values[::-1].copy())
+    assert exchange_gain(exchanged, THROW, Held()) > EXCHANGED
+    if model == "free-flight":
+        with pytest.raises((UnsoundError, NoFlightError), match="exchanged"):
+            Judged(estimate(exchanged, THROW)).check()
+
+
+def test_a_grid_without_any_likelihood_is_refused(monkeypatch):
+    monkeypatch.setattr("flipproof.film.estimate.Grid.masses", property(lambda grid: np.full(len(grid.nodes), -np.inf)))
+    with pytest.raises(NoFlightError, match="no flight fits the clicks"):
+        estimate(film_of(clip(3, fps=30)), THROW)
 
 
 def test_nothing_that_flies_is_refused():
