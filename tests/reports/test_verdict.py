@@ -214,14 +214,14 @@ def test_the_answer_follows_from_step_and_equation(step, equation, words):
         (
             0.42,
             "gravity in Eq. 8",
-            "Eq. 8 lets gravity slide water along the bottle, and the paper’s program solves another equation, "
-            "though with short enough time steps.",
+            "Eq. 8 lets gravity slide water along the bottle, and the paper’s program solves another equation; "
+            "shorter time steps would not help.",
         ),
         (
             0.42,
             "no recoil in impacts",
-            "Eq. 8 is not free flight, and the paper’s program solves another equation, "
-            "though with short enough time steps.",
+            "Eq. 8 is not free flight, and the paper’s program solves another equation; "
+            "shorter time steps would not help.",
         ),
         (
             0.01,
