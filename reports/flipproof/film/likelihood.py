@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.film.curves import Curve
-from flipproof.film.kernel.scoring import points, sums
+from flipproof.film.kernel.scoring import ended, points, sums, variances
 from slicemodel.trajectory import FloatArray
 
 GRAVITY: Final = 9.81
@@ -196,21 +196,13 @@ class Likelihood:
 
     def variance(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the variance of one coordinate (P,), and its slopes by the inner parameters (P, K)."""
-        t, n = self.film.t, self.index
-        sigma = np.exp(2 * x[n["log_noise"]])
-        slopes = np.zeros((len(t), len(n)))
-        slopes[:, n["log_noise"]] = 2 * sigma
+        t = self.film.t
         if not self.two:
-            return np.full(len(t), sigma), slopes
-        most = self.area / (2 * np.pi)
-        before, hand = np.minimum(t - x[0], 0.0), np.exp(x[n["log_hand"]])
-        pulled, taken = (hand * before**3 / 6) ** 2, (self.speed * np.maximum(t - self.touch, 0.0)) ** 2
-        added = pulled + taken
-        free = most / (most + added)
-        # What exceeds the picture levels off there.
-        slopes[:, 0] = -(hand**2) * before**5 / 6 * free**2
-        slopes[:, n["log_hand"]] = 2 * pulled * free**2
-        return sigma + added * free, slopes
+            slopes = np.zeros((len(t), len(x)))
+            slopes[:, -1] = 2 * np.exp(2 * x[-1])
+            return np.full(len(t), np.exp(2 * x[-1])), slopes
+        variance, slopes = variances(t, x, self.touch, self.speed, self.area / (2 * np.pi))
+        return variance, slopes
 
     # ------------------------------------------------------------------ densities
 
@@ -221,20 +213,12 @@ class Likelihood:
         return self._density(self.film.values - values, variance)
 
     def touches(self, curve: Curve, x: FloatArray, times: FloatArray, speed: float) -> FloatArray:
-        """Return the cost of every frame's values had the touch been at some times, shape (len(times),)."""
+        """Return the cost of all clicks had the touch been at each of some times, shape (len(times),)."""
         values, _ = self.model(curve, x)
-        old, self.touch = self.touch, np.inf
-        variance, _ = self.variance(x)
-        self.touch = old
-        missed = np.where(self.seen[:, :, None], self.film.values - values, 0.0)
-        most = self.area / (2 * np.pi)
-        taken = (speed * np.maximum(self.film.t - times[:, None], 0.0)) ** 2
-        spread = variance + taken * most / (most + taken)
-        cost = np.zeros(len(times))
-        for seen, one in zip(self.seen, (missed**2).sum(axis=2), strict=True):
-            good = np.log1p(-BAD) - one / (2 * spread) - np.log(2 * np.pi * spread)
-            cost -= np.logaddexp(good, self.log_bad)[:, seen].sum(axis=1)
-        return cost
+        t, most = self.film.t, self.area / (2 * np.pi)
+        variance, _ = variances(t, x, np.inf, 0.0, most)
+        squares = (np.where(self.seen[:, :, None], self.film.values - values, 0.0) ** 2).sum(axis=2)
+        return np.asarray(ended(squares, self.seen, variance, t, times, speed, most, np.log1p(-BAD), self.log_bad))
 
     def _density(self, missed: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         missed = np.where(self.seen[:, :, None], missed, 0.0)
@@ -244,38 +228,40 @@ class Likelihood:
         both = np.logaddexp(good, self.log_bad)
         return np.where(self.seen, -both, 0.0), np.where(self.seen, np.exp(good - both), 0.0), missed
 
-    def penalty(self, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Return cost, gradient and curvature of priors: what is held, and weak ones that keep parameters in reach."""
-        away = x - self.expected
-        gradient = self.stiffness * away
-        cost, curvature = 0.5 * float(away @ gradient), np.diag(self.stiffness)
-        if self.two and self.held.scale:
-            down = float(np.hypot(x[7], x[8]))
-            row = x[7:9] / (down * TIGHT)
-            cost += 0.5 * ((down - GRAVITY) / TIGHT) ** 2
-            gradient[7:9] += (down - GRAVITY) / TIGHT * row
-            curvature[7:9, 7:9] += np.outer(row, row)
-        # The integral over what else is fitted is the larger the larger the noise: the mode is that of the noise alone.
-        at = self.index["log_noise"]
-        gradient[at] -= self.degrees
-        return cost - self.degrees * x[at], gradient, curvature
-
     def terms(self, curve: Curve, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return the cost, its gradient and Fisher's information."""
         values, slopes = self.model(curve, x)
         variance, dv = self.variance(x)
         missed = self.film.values - values
         cost, gradient, information = sums(missed, self.seen, slopes, variance, dv, np.log1p(-BAD), self.log_bad)
-        total, pull, stiff = self.penalty(x)
-        return cost + total, gradient + pull, information + stiff
+        return cost + self._add_priors(x, gradient, information), gradient, information
+
+    def _add_priors(self, x: FloatArray, gradient: FloatArray, information: FloatArray) -> float:
+        """Add what is held, and weak priors that keep parameters in reach, to both; return their cost."""
+        away = x - self.expected
+        pull = self.stiffness * away
+        gradient += pull
+        information.flat[:: len(x) + 1] += self.stiffness
+        cost = 0.5 * float(away @ pull)
+        if self.two and self.held.scale:
+            down = float(np.hypot(x[7], x[8]))
+            row = x[7:9] / (down * TIGHT)
+            cost += 0.5 * ((down - GRAVITY) / TIGHT) ** 2
+            gradient[7:9] += (down - GRAVITY) / TIGHT * row
+            information[7:9, 7:9] += np.outer(row, row)
+        # The integral over what else is fitted is the larger the larger the noise: the mode is that of the noise alone.
+        at = self.index["log_noise"]
+        gradient[at] -= self.degrees
+        return float(cost - self.degrees * x[at])
 
     def fitted(self, curve: Curve, x: FloatArray, steps: int = 30) -> Fit:
         """Return the inner parameters of the least cost near ``x``, by scoring with Levenberg's damping."""
         cost, gradient, hessian = self.terms(curve, x)
         damping = 1e-6
         for _ in range(steps):
-            scale = np.diag(hessian) + 1e-12
-            step = -np.linalg.solve(hessian + damping * np.diag(scale), gradient)
+            damped = hessian.copy()
+            damped.flat[:: len(x) + 1] += damping * (np.diag(hessian) + 1e-12)
+            step = -np.linalg.solve(damped, gradient)
             trial = x + step
             sound = trial[2] * x[2] > 0 and abs(step[self.index["log_noise"]]) < 5
             new = self.terms(curve, trial) if sound else None

@@ -1,4 +1,4 @@
-"""Compiled: a curve between its rows, the points that it means, and the sums of Fisher's scoring over all clicks.
+"""Compiled: a curve between its rows, the points that it means, how far clicks may miss them, and Fisher's sums.
 
 A fit of a film asks these some ten thousand times, for a few dozen frames each, where NumPy's calls take longer than
 their arithmetic. Names and shapes are those of ``curves`` and ``likelihood``: P frames, B bodies, D coordinates, K
@@ -82,6 +82,27 @@ def points(turning, t, x):
 
 
 @kept_on_disk()
+def variances(t, x, touch, speed, most):
+    """Return the variance of one coordinate of a click (P,), and its slopes by the inner parameters (P, K).
+
+    A hand adds to it before the release, and a table that takes a velocity ``speed`` after the touch; both level off
+    at ``most``, beyond the picture.
+    """
+    variance, slopes = np.empty(len(t)), np.zeros((len(t), len(x)))
+    sigma, hand = math.exp(2 * x[13]), math.exp(x[14])
+    for i in range(len(t)):
+        before = min(t[i] - x[0], 0.0)
+        pulled = (hand * before**3 / 6) ** 2
+        added = pulled + (speed * max(t[i] - touch, 0.0)) ** 2
+        free = most / (most + added)
+        variance[i] = sigma + added * free
+        slopes[i, 0] = -(hand**2) * before**5 / 6 * free**2
+        slopes[i, 13] = 2 * sigma
+        slopes[i, 14] = 2 * pulled * free**2
+    return variance, slopes
+
+
+@kept_on_disk()
 def sums(missed, seen, slopes, variance, dv, log_good, log_bad):
     """Return the cost of all values, its gradient (K,) and Fisher's information (K, K).
 
@@ -127,6 +148,39 @@ def sums(missed, seen, slopes, variance, dv, log_good, log_bad):
         for m in range(k):
             information[m, k] = information[k, m]
     return cost, gradient, information
+
+
+@kept_on_disk()
+def frame_cost(squares, seen, i, variance, log_good, log_bad):
+    """Return the cost of the clicks of two coordinates in frame ``i``."""
+    normal, cost = log_good - math.log(2 * math.pi * variance), 0.0
+    for body in range(len(squares)):
+        if seen[body, i]:
+            good = normal - squares[body, i] / (2 * variance)
+            high, low = max(good, log_bad), min(good, log_bad)
+            cost -= high + math.log1p(math.exp(low - high))
+    return cost
+
+
+@kept_on_disk()
+def ended(squares, seen, variance, t, times, speed, most, log_good, log_bad):
+    """Return the cost of all clicks had the flight ended at each of some times, (len(times),).
+
+    ``squares`` (B, P) is how far clicks miss, squared, and ``variance`` (P,) that of a coordinate without a table.
+    Frames before a time cost what they cost without one, and are added up once.
+    """
+    frames = len(t)
+    flown = np.zeros(frames + 1)
+    for i in range(frames):
+        flown[i + 1] = flown[i] + frame_cost(squares, seen, i, variance[i], log_good, log_bad)
+    cost = np.empty(len(times))
+    for j in range(len(times)):
+        first = np.searchsorted(t, times[j])
+        cost[j] = flown[first]
+        for i in range(first, frames):
+            taken = (speed * (t[i] - times[j])) ** 2
+            cost[j] += frame_cost(squares, seen, i, variance[i] + taken * most / (most + taken), log_good, log_bad)
+    return cost
 
 
 @kept_on_disk()
