@@ -197,7 +197,7 @@ def test_an_edit_after_the_import_keeps_and_finds_nothing(place, tmp_path, sourc
         package = Path(find_spec(name).origin).parent
         shutil.copytree(package, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
     code = EDITED.format(first=source)
-    environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-c", code, str(place), str((copy / source.replace(".", "/")).with_suffix(".py"))]
     ended = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert ended.returncode == 0, ended.stderr

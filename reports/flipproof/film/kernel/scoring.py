@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from slicemodel.compiled import kept_on_disk
+from slicemodel.compiled import inner, kept_on_disk
 
 
 @kept_on_disk()
@@ -150,7 +150,7 @@ def sums(missed, seen, slopes, variance, dv, log_good, log_bad):
     return cost, gradient, information
 
 
-@kept_on_disk()
+@inner
 def frame_cost(squares, seen, i, variance, log_good, log_bad):
     """Return the cost of the clicks of two coordinates in frame ``i``."""
     normal, cost = log_good - math.log(2 * math.pi * variance), 0.0
