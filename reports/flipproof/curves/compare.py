@@ -50,9 +50,9 @@ def beside(
     near = 1e-12 * max(abs(times[0]), abs(times[-1]))  # printing and reading a time explains so much
     before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
     own = before <= behind
-    found = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
-    found[~own] = np.interp(t[~own], times, others)
-    return t, values, found, ~own
+    resampled = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
+    resampled[~own] = np.interp(t[~own], times, others)
+    return t, values, resampled, ~own
 
 
 def interpolation_error(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
@@ -101,9 +101,9 @@ def gap(first: Curves, second: Curves, column: str, *, shift: float, least: floa
         of_first.time[of_first.time <= t[-1]], of_second.time[of_second.time <= t[-1]], shift + of_first.step
     )
     reach = of_first.step + of_second.step
-    for one, other in matched.pairs:
-        around = (t >= min(one, other) - reach) & (t <= max(one, other) + reach)
-        lower, upper = tube_around(first.t, values, t[around], abs(other - one) + reach, 0.0)
+    for t_first, t_second in matched.pairs:
+        around = (t >= min(t_first, t_second) - reach) & (t <= max(t_first, t_second) + reach)
+        lower, upper = tube_around(first.t, values, t[around], abs(t_second - t_first) + reach, 0.0)
         size[around] = np.maximum(0.0, np.maximum(its[around] - upper, lower - its[around]))
     error = np.where(interpolated, interpolation_error(second.t, others, t), 0.0)
     return Gap(
@@ -172,49 +172,49 @@ class Comparison:
     @property
     def horizon(self) -> float | None:
         """Earliest horizon of a column; None: comparable to the end."""
-        return min((each.horizon for each in self.columns if each.horizon is not None), default=None)
+        return min((column.horizon for column in self.columns if column.horizon is not None), default=None)
 
     @property
     def parted(self) -> float | None:
         """First time at which a difference is inadmissible; None: never."""
-        return min((each.parted for each in self.columns if each.parted is not None), default=None)
+        return min((column.parted for column in self.columns if column.parted is not None), default=None)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """One claim a column: its difference is admissible wherever it can be compared."""
-        found = []
-        for each in self.columns:
-            id_, k = f"compare-{_slug(each.name)}", each.worst
-            title = f"difference in {each.name} between {self.first} and {self.second}"
+        findings = []
+        for column in self.columns:
+            id_, k = f"compare-{_slug(column.name)}", column.worst
+            title = f"difference in {column.name} between {self.first} and {self.second}"
             if k is None:
                 note = "no time can be compared: the band is wider than half the tolerance"
-                found.append(regression(id_, title, None, "", (0.0, each.tolerance), note))
+                findings.append(regression(id_, title, None, "", (0.0, column.tolerance), note))
                 continue
-            note = f"at t = {each.gap.t[k]:.6g}, {int(each.comparable.sum())} of {len(each.gap.t)} times compared"
-            value, allowed = float(each.gap.size[k]), float(each.allowed[k])
-            band = Band(float(each.band[k] + each.gap.error[k]), "twins")
-            found.append(regression(id_, title, value, "", (0.0, allowed), note, band=band))
-        return tuple(found)
+            note = f"at t = {column.gap.t[k]:.6g}, {int(column.comparable.sum())} of {len(column.gap.t)} times compared"
+            value, allowed = float(column.gap.size[k]), float(column.allowed[k])
+            band = Band(float(column.band[k] + column.gap.error[k]), "twins")
+            findings.append(regression(id_, title, value, "", (0.0, allowed), note, band=band))
+        return tuple(findings)
 
     @property
     def lines(self) -> list[str]:
         """The comparison in lines of text, the verdict last."""
         lines = list(self.notes)
-        for each in self.columns:
-            gap, k = each.gap, int(each.gap.size.argmax())
-            words = f"{each.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.6g}"
+        for column in self.columns:
+            gap, k = column.gap, int(column.gap.size.argmax())
+            words = f"{column.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.6g}"
             if gap.interpolated:
                 words += f" ({gap.interpolated} of {len(gap.t)} times interpolated)"
-            if each.band.any():
-                words += f"; the twins' change {each.growth.words.replace('/s', 'per unit of time')}"
+            if column.band.any():
+                words += f"; the twins' change {column.growth.words.replace('/s', 'per unit of time')}"
             lines.append(words)
-            if each.last_digit is not None:
+            if column.last_digit is not None:
                 lines.append(
-                    f"{each.name}: a change by one unit in the last place shows {each.tolerance:g} at "
-                    f"t = {each.last_digit:.3g}"
+                    f"{column.name}: a change by one unit in the last place shows {column.tolerance:g} at "
+                    f"t = {column.last_digit:.3g}"
                 )
         if (horizon := self.horizon) is not None:
-            at = next(each.tolerance for each in self.columns if each.horizon == horizon)
+            at = next(column.tolerance for column in self.columns if column.horizon == horizon)
             lines.append(f"beyond t = {horizon:.4g} these two cannot be compared at {at:g}")
         lines += self.events.lines(self.parted)
         for finding in self.findings:
@@ -234,19 +234,19 @@ class Comparison:
             "events": self.events.to_mapping(),
             "columns": [
                 {
-                    "column": each.name,
-                    "largest": float(each.gap.size.max()),
-                    "time": float(each.gap.t[each.gap.size.argmax()]),
-                    "tolerance": each.tolerance,
-                    "horizon": each.horizon,
-                    "growth_rate": _finite(each.growth.rate),
-                    "growth_error": _finite(each.growth.error),
-                    "last_digit_shows_at": each.last_digit,
-                    "times": len(each.gap.t),
-                    "compared": int(each.comparable.sum()),
-                    "interpolated": each.gap.interpolated,
+                    "column": column.name,
+                    "largest": float(column.gap.size.max()),
+                    "time": float(column.gap.t[column.gap.size.argmax()]),
+                    "tolerance": column.tolerance,
+                    "horizon": column.horizon,
+                    "growth_rate": _finite(column.growth.rate),
+                    "growth_error": _finite(column.growth.error),
+                    "last_digit_shows_at": column.last_digit,
+                    "times": len(column.gap.t),
+                    "compared": int(column.comparable.sum()),
+                    "interpolated": column.gap.interpolated,
                 }
-                for each in self.columns
+                for column in self.columns
             ],
             "findings": [finding.to_mapping() for finding in self.findings],
         }
@@ -297,15 +297,15 @@ def compare(
         again = np.diff(run.t) == 0.0
         if between := np.count_nonzero(again[1:] & again[:-1]):
             notes.append(f"{run.label}: {between} rows between the first and the last of one time are not compared")
-    made = []
+    compared = []
     for name in shared:
         allowed = 0.0 if tolerance is None else tolerance[name] if isinstance(tolerance, Mapping) else tolerance
-        made.append(_column(name, first, second, twins, twins_of_second, allowed, shift))
+        compared.append(_column(name, first, second, twins, twins_of_second, allowed, shift))
     return Comparison(
         first=first.label,
         second=second.label,
-        columns=tuple(made),
-        events=_events(first, second, made, shift),
+        columns=tuple(compared),
+        events=_events(first, second, compared, shift),
         notes=tuple(notes),
     )
 
@@ -317,11 +317,11 @@ def _column(
     least = tolerance or TOLERANCE * float(np.ptp(first.columns[name]))
     changes = []
     for run, doubles in ((first, twins), (second, others)):
-        each = [gap(run, twin, name, shift=np.inf, least=least) for twin in doubles]
-        changes.append(each)
-        shift += SAFETY * max((float(np.abs(g.matched.shift).max(initial=0.0)) for g in each), default=0.0)
+        gaps = [gap(run, twin, name, shift=np.inf, least=least) for twin in doubles]
+        changes.append(gaps)
+        shift += SAFETY * max((float(np.abs(g.matched.shift).max(initial=0.0)) for g in gaps), default=0.0)
     between = gap(first, second, name, shift=shift, least=least)
-    change = sum((_widest(each, between.t) for each in changes), np.zeros(len(between.t)))
+    change = sum((_widest(gaps, between.t) for gaps in changes), np.zeros(len(between.t)))
     band = SAFETY * np.maximum.accumulate(change)
     comparable = np.ones(len(band), bool) if not tolerance else band <= 0.5 * tolerance
     beyond = np.flatnonzero(~comparable)
@@ -352,7 +352,7 @@ def _column(
 
 def _widest(changes: Sequence[Gap], t: FloatArray) -> FloatArray:
     """Return the largest change by a twin at the times ``t``; infinite where a twin does not exist."""
-    sizes = [np.interp(t, each.t, each.size, left=np.inf, right=np.inf) for each in changes]
+    sizes = [np.interp(t, change.t, change.size, left=np.inf, right=np.inf) for change in changes]
     return np.max(sizes, axis=0) if sizes else np.zeros(len(t))
 
 
@@ -363,7 +363,7 @@ def _events(first: Curves, second: Curves, columns: Sequence[Column], shift: flo
         until = min(first.t[-1], second.t[-1])
         times = [run.t_events[run.t_events <= until] for run in (first, second) if run.t_events is not None]
         return match(times[0], times[1], shift + step)
-    return max((each.gap.matched for each in columns), key=lambda found: len(found.pairs) + len(found.lone))
+    return max((column.gap.matched for column in columns), key=lambda matched: len(matched.pairs) + len(matched.lone))
 
 
 def _slug(name: str) -> str:

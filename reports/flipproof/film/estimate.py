@@ -157,7 +157,7 @@ def estimate(
         If the film has too few values, or no flight in it (``NoFlightError``), or the solver cannot be fitted.
     """
     held = held or Held()
-    known = throw.with_slices(slices or min(throw.n_slices, SLICES))
+    sliced = throw.with_slices(slices or min(throw.n_slices, SLICES))
     made, began = 0, time.perf_counter()
 
     def count(flights: int) -> None:
@@ -165,9 +165,9 @@ def estimate(
         made += flights
         tick(flights)
 
-    starts = [(likelihood, x) for _, likelihood, x in _start(film, known, held)]
+    starts = [(likelihood, x) for _, likelihood, x in _start(film, sliced, held)]
     reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, x in starts) + 0.5  # the touch may turn out later
-    equation = Equation(solver, known, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
+    equation = Equation(solver, sliced, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
     likelihood, x = starts[0] if len(starts) == 1 else _chosen(starts, equation)
     likelihood, grid, complete = _closed_in(likelihood, equation, x, seconds)
     if not np.isfinite(grid.masses).any():
@@ -184,7 +184,7 @@ def estimate(
     draws["touch"] = times[picked] + (times[1] - times[0]) * (rng.random(DRAWS) - 0.5)
     likelihood = Likelihood(film, likelihood.held, likelihood.touch, likelihood.noise, likelihood.speed)
     return Estimate(
-        film=film, throw=known, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
+        film=film, throw=sliced, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
         draws=draws, evidence=float(np.logaddexp.reduce(grid.masses) - np.log(np.arcsinh(MAX_RATE / SCALE))),
         touched=bool(likelihood.touch < film.t[-1]), flights=made, complete=complete,
     )  # fmt: skip
@@ -279,9 +279,9 @@ def _closed_in(
             _, first = np.unique(nodes[order, 1], return_index=True)
             for k in order[:3] if descended else order[first]:
                 more = _descent(likelihood, equation, nodes[k], fits[k].x, cell, (low, high))
-                nodes = np.concatenate((nodes, [one[0] for one in more]))
-                curves += [one[1] for one in more]
-                fits += [one[2] for one in more]
+                nodes = np.concatenate((nodes, [trial[0] for trial in more]))
+                curves += [trial[1] for trial in more]
+                fits += [trial[2] for trial in more]
             descended = True
             levels = np.array([fit.evidence for fit in fits])
             order = np.argsort(-levels)
@@ -317,14 +317,14 @@ def _refined(likelihood: Likelihood, equation: Equation, grid: Grid, ends: float
         tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
         rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
         flown = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
-        made = [k for k, curve in enumerate(flown) if curve is not None]
+        successes = [k for k, curve in enumerate(flown) if curve is not None]
         curves = [curve for curve in flown if curve is not None]
         grid = Grid(
-            np.concatenate((grid.nodes[whole], nodes[made])),
-            np.concatenate((grid.cells[whole], np.repeat(grid.cells[cut] / 2, 4, axis=0)[made])),
+            np.concatenate((grid.nodes[whole], nodes[successes])),
+            np.concatenate((grid.cells[whole], np.repeat(grid.cells[cut] / 2, 4, axis=0)[successes])),
             [*(grid.curves[k] for k in whole), *curves],
             [*(grid.fits[k] for k in whole),
-             *(likelihood.fitted(curve, parents[k]) for k, curve in zip(made, curves, strict=True))],
+             *(likelihood.fitted(curve, parents[k]) for k, curve in zip(successes, curves, strict=True))],
         )  # fmt: skip
     return grid
 
@@ -374,7 +374,7 @@ def _descent(
     box: tuple[FloatArray, FloatArray],
 ) -> list[tuple[FloatArray, Curve, Fit]]:
     """Return what Nelder and Mead's simplex sees on its way down from a node; it asks no slopes, which have folds."""
-    seen: list[tuple[FloatArray, Curve, Fit]] = []
+    trials: list[tuple[FloatArray, Curve, Fit]] = []
     tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
 
     def less(place: FloatArray) -> float:
@@ -382,15 +382,15 @@ def _descent(
         (curve,) = equation.curves(rate, float(x[2]), float(x[1]) - tilt)
         if curve is None:
             return math.inf
-        seen.append((place.copy(), curve, likelihood.fitted(curve, seen[-1][2].x if seen else x)))
-        return -seen[-1][2].evidence
+        trials.append((place.copy(), curve, likelihood.fitted(curve, trials[-1][2].x if trials else x)))
+        return -trials[-1][2].evidence
 
     simplex = np.clip(node + np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]) * cell, *box)
     minimize(
         less, node, method="Nelder-Mead", bounds=list(zip(*box, strict=True)),
         options={"initial_simplex": simplex, "maxfev": 40, "xatol": 1e-6, "fatol": 0.5},
     )  # fmt: skip
-    return seen
+    return trials
 
 
 def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
@@ -408,17 +408,21 @@ def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
         at = likelihood.index["log_noise"]
         wider = np.exp(moved[:, at : at + 1])
         inner[mine] = fits[k].x + np.where(np.arange(len(root)) == at, moved, moved * wider)
-    found = dict(zip(likelihood.film.names, inner.T, strict=True))
+    parameters = dict(zip(likelihood.film.names, inner.T, strict=True))
     draws = {
-        "gamma": SCALE * np.sinh(np.maximum(place[:, 0], 0.0)) * np.abs(found["omega0"]),
+        "gamma": SCALE * np.sinh(np.maximum(place[:, 0], 0.0)) * np.abs(parameters["omega0"]),
         "restitution": np.clip(place[:, 1], 0.0, 1.0),
-        **{name: found[name] for name in ("omega0", "theta0", "release")},
-        "noise": np.exp(found["log_noise"]),
+        **{name: parameters[name] for name in ("omega0", "theta0", "release")},
+        "noise": np.exp(parameters["log_noise"]),
     }
     if likelihood.two:
-        tilt = np.arctan2(found["ax"], -found["ay"])
-        draws |= {name: found[name] for name in ("length", "x0", "y0", "vx", "vy")}
-        draws |= {"tilt": np.degrees(tilt), "g": np.hypot(found["ax"], found["ay"]), "theta0": found["theta0"] - tilt}
+        tilt = np.arctan2(parameters["ax"], -parameters["ay"])
+        draws |= {name: parameters[name] for name in ("length", "x0", "y0", "vx", "vy")}
+        draws |= {
+            "tilt": np.degrees(tilt),
+            "g": np.hypot(parameters["ax"], parameters["ay"]),
+            "theta0": parameters["theta0"] - tilt,
+        }
     return draws
 
 
@@ -436,11 +440,11 @@ def _touches(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[Float
         return np.array([touch, touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
     frames = np.append(film.t[film.t > x[0]], film.t[-1] + step)
     rough = {speed: likelihood.touches(curve, x, frames, speed) for speed in TOUCH}
-    speed = min(rough, key=lambda one: float(rough[one].min()))
+    speed = min(rough, key=lambda velocity: float(rough[velocity].min()))
     near = frames[int(np.argmin(rough[speed]))]
     times = np.minimum(near + step * np.arange(-32, 33) / 16, film.t[-1] + step)
     # How fast the table takes the velocity, and since when, look alike.
-    costs = [likelihood.touches(curve, x, times, one) for one in TOUCH]
+    costs = [likelihood.touches(curve, x, times, velocity) for velocity in TOUCH]
     return times, -np.asarray(np.logaddexp.reduce(-np.array(costs), axis=0)), speed
 
 
@@ -482,7 +486,9 @@ def exchange_gain(film: Film, throw: Scenario, held: Held) -> float:
     some = slice(None, None, max(1, len(film.t) // 80))
     part = replace(film, t=film.t[some], values=film.values[:, some], lines=film.lines[some])
     try:
-        costs = [_start(one, throw, held)[0][0] for one in (part, replace(part, values=part.values[::-1].copy()))]
+        costs = [
+            _start(candidate, throw, held)[0][0] for candidate in (part, replace(part, values=part.values[::-1].copy()))
+        ]
     except NoFlightError:
         return -math.inf
     return costs[0] - costs[1]
@@ -497,22 +503,22 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
     if film.quantity != "points":
         return [(0.0, *_start_table(film, held))]
     theta, t = film.angle, film.t
-    known = np.flatnonzero(~np.isnan(theta))
-    if len(known) < 8:
-        raise NoFlightError(f"{film.label}: cap and base were clicked together in {len(known)} frames; 8 are needed")
+    frames = np.flatnonzero(~np.isnan(theta))
+    if len(frames) < 8:
+        raise NoFlightError(f"{film.label}: cap and base were clicked together in {len(frames)} frames; 8 are needed")
     step = float(np.median(np.diff(t)))
     equation = Equation("free-flight", throw, 30.0)
     pairs = np.array(list(product((0.02, 0.1, 0.3, 1.0), (0.2, 0.5, 0.8))))
     every = [curve for curve in equation.curves(pairs, 20.0, 0.0) if curve]
     length = float(np.nanmedian(np.hypot(*(film.values[1] - film.values[0]).T)))
-    angle, times = theta[known], t[known]
-    first = np.arange(len(known)) if held.release is None else np.flatnonzero(times >= held.release - 1e-9)
+    angle, times = theta[frames], t[frames]
+    first = np.arange(len(frames)) if held.release is None else np.flatnonzero(times >= held.release - 1e-9)
     first = first[:: max(1, len(first) // 80)]
     rates = np.outer([_rate(times[k:], angle[k:], max(4, int(0.03 / step))) for k in first], FASTER)
-    found = turnings(angle, times, first, rates, np.array([curve.rows for curve in every]), STEP, 0.3)
+    matches = turnings(angle, times, first, rates, np.array([curve.rows for curve in every]), STEP, 0.3)
     tried: list[tuple[float, Likelihood, FloatArray]] = []
-    for k, (score, index, omega0, start, last) in zip(first, found, strict=True):
-        if score < 0.4 * found[:, 0].max() or not score:
+    for k, (score, index, omega0, start, last) in zip(first, matches, strict=True):
+        if score < 0.4 * matches[:, 0].max() or not score:
             continue
         curve, end = every[int(index)], float(times[int(last)])
         x, noise = _placed(film, curve, np.array([times[k], start, omega0]), end, length)
@@ -532,22 +538,22 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
             if better[2][8] < 0.0:  # what accelerates upwards is no flight
                 tried.append(better)
     # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
-    tried.sort(key=lambda one: one[0] + _off_gravity(one[2]))
+    tried.sort(key=lambda guess: guess[0] + _off_gravity(guess[2]))
     apart_by: list[tuple[float, Likelihood, FloatArray]] = []
-    for one in tried:
+    for guess in tried:
         if len(apart_by) < 5 and all(
-            abs(one[2][0] - other[2][0]) > 0.04 or abs(one[1].touch - other[1].touch) > 0.08 for other in apart_by
+            abs(guess[2][0] - other[2][0]) > 0.04 or abs(guess[1].touch - other[1].touch) > 0.08 for other in apart_by
         ):
-            apart_by.append(one)
+            apart_by.append(guess)
     if not apart_by:
         raise NoFlightError(
             f"{film.label}: no stretch of the film is free flight; check that y points up and that cap and base are "
             "not exchanged, or give --release and --landing"
         )
     polished = [
-        min((_better(one[1], curve, one[2]) for curve in every), key=lambda other: other[0]) for one in apart_by
+        min((_better(guess[1], curve, guess[2]) for curve in every), key=lambda other: other[0]) for guess in apart_by
     ]
-    return sorted(polished, key=lambda one: one[0])
+    return sorted(polished, key=lambda guess: guess[0])
 
 
 def _off_gravity(x: FloatArray) -> float:

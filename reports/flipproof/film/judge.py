@@ -61,15 +61,15 @@ class Judged:
     @cached_property
     def flying(self) -> NDArray[np.bool_]:
         """Frames in flight with an angle that is not doubted, shape (P,)."""
-        one = self.estimate
-        return np.asarray(one.flying & one.film.clicked.all(axis=0) & ~one.doubted.any(axis=0))
+        estimate = self.estimate
+        return np.asarray(estimate.flying & estimate.film.clicked.all(axis=0) & ~estimate.doubted.any(axis=0))
 
     @cached_property
     def fitted(self) -> tuple[FloatArray, FloatArray]:
         """theta and omega of the fitted flight at the film's frames, in the picture, each (P,)."""
-        one, x = self.estimate, self.estimate.fit.x
-        tilt = math.atan2(x[7], -x[8]) if one.likelihood.two else 0.0
-        turned, rate, *_ = one.curve.at(abs(x[2]) * (one.film.t - x[0]), float(x[2]), float(x[1]) - tilt)
+        estimate, x = self.estimate, self.estimate.fit.x
+        tilt = math.atan2(x[7], -x[8]) if estimate.likelihood.two else 0.0
+        turned, rate, *_ = estimate.curve.at(abs(x[2]) * (estimate.film.t - x[0]), float(x[2]), float(x[1]) - tilt)
         return x[1] + np.sign(x[2]) * turned, x[2] * rate
 
     @cached_property
@@ -129,8 +129,8 @@ class Judged:
     @property
     def falls(self) -> bool:
         """Whether the fitted flight falls about as things do; so where nothing says how it falls."""
-        one = self.estimate
-        return not one.likelihood.two or abs(one.best["g"] / GRAVITY - 1.0) < FALL_ERROR
+        estimate = self.estimate
+        return not estimate.likelihood.two or abs(estimate.best["g"] / GRAVITY - 1.0) < FALL_ERROR
 
     @property
     def explained(self) -> bool:
@@ -160,35 +160,35 @@ class Judged:
 
     def check(self) -> None:
         """Refuse what cannot be right: raise UnsoundError, one line that says what to click again."""
-        one, x = self.estimate, self.estimate.fit.x
-        film, held = one.film, one.held
-        if not one.complete:
+        estimate, x = self.estimate, self.estimate.fit.x
+        film, held = estimate.film, estimate.held
+        if not estimate.complete:
             raise UnsoundError(
-                f"{film.label}: {one.solver}: the search did not end in {one.flights} flights: give more --minutes or "
-                "fewer --slices"
+                f"{film.label}: {estimate.solver}: the search did not end in {estimate.flights} flights: give more "
+                "--minutes or fewer --slices"
             )
         if len(self.missed) < 8:
             raise UnsoundError(f"{film.label}: {len(self.missed)} sound frames in flight; 8 are needed: click more")
-        if one.likelihood.two:
-            if (gain := exchange_gain(film, one.throw, held)) > EXCHANGED:
+        if estimate.likelihood.two:
+            if (gain := exchange_gain(film, estimate.throw, held)) > EXCHANGED:
                 raise UnsoundError(
                     f"{film.label}: with cap and base exchanged the clicks are exp({gain:.0f}) times as likely: name "
                     "the other track as the cap"
                 )
-            low, high = one.interval("g", 0.9999)
+            low, high = estimate.interval("g", 0.9999)
             if not held.scale and not low - SCALE_ERROR * GRAVITY <= GRAVITY <= high + SCALE_ERROR * GRAVITY:
-                found = one.best["g"]
+                gravity = estimate.best["g"]
                 raise UnsoundError(
-                    f"{film.label}: g = {found:.3g} m/s^2 in the picture, not {GRAVITY:g}: click the calibration stick "
-                    f"again (lengths {found / GRAVITY:.3g} times too long), or name the frame rate of the recording "
-                    f"(times {math.sqrt(GRAVITY / max(found, 1e-9)):.3g} times too long); y points up"
+                    f"{film.label}: g = {gravity:.3g} m/s^2 in the picture, not {GRAVITY:g}: click the calibration "
+                    f"stick again (lengths {gravity / GRAVITY:.3g} times too long), or name the frame rate of the "
+                    f"recording (times {math.sqrt(GRAVITY / max(gravity, 1e-9)):.3g} times too long); y points up"
                 )
             if held.release is None and x[0] < film.t[0] + 2 * float(np.median(np.diff(film.t))):
                 raise UnsoundError(
                     f"{film.label}: the release at {x[0]:.4g} s lies within two frames of the first: click frames "
                     "before the hand lets go, or give --release"
                 )
-            if self.noise > 0.1 * one.best["length"]:
+            if self.noise > 0.1 * estimate.best["length"]:
                 raise UnsoundError(
                     f"{film.label}: no flight fits better than {1e3 * self.noise:.2g} mm: are cap and base exchanged, "
                     "or other things clicked?"
@@ -199,22 +199,22 @@ class Judged:
 
     def _check_release(self) -> None:
         """Refuse a release before which the bottle falls freely already."""
-        one = self.estimate
-        release = one.interval("release")[0]
-        hand = before(one.film, release, one.likelihood.touch, max(self.own_noise, 1e-6))
+        estimate = self.estimate
+        release = estimate.interval("release")[0]
+        hand = before(estimate.film, release, estimate.likelihood.touch, max(self.own_noise, 1e-6))
         if hand is not None and hand.falls:
             raise UnsoundError(
-                f"{one.film.label}: {1e3 * hand.seconds:.0f} ms before the release at {release:.3f} s the bottle falls "
-                "freely by its clicks alone: the flight begins earlier, and no fit was found that says so: click the "
-                "frames there again, or give --release"
+                f"{estimate.film.label}: {1e3 * hand.seconds:.0f} ms before the release at {release:.3f} s the bottle "
+                "falls freely by its clicks alone: the flight begins earlier, and no fit was found that says so: click "
+                "the frames there again, or give --release"
             )
 
     def _check_rates(self) -> None:
         """Refuse an omega_0 that is not the slope of the clicked angle, and a plateau above it."""
-        one, film = self.estimate, self.estimate.film
-        t, omega0, sign = film.t[self.flying], one.best["omega0"], math.copysign(1.0, one.best["omega0"])
+        estimate, film = self.estimate, self.estimate.film
+        t, omega0, sign = film.t[self.flying], estimate.best["omega0"], math.copysign(1.0, estimate.best["omega0"])
         theta, fitted = self.theta[self.flying], self.fitted[0][self.flying]
-        size = math.sqrt(2.0) * self.noise / one.best["length"] if one.likelihood.two else self.noise
+        size = math.sqrt(2.0) * self.noise / estimate.best["length"] if estimate.likelihood.two else self.noise
         early = t <= max(float(t[0]) + 0.06, float(t[min(4, len(t) - 1)]))
         late = t >= (t[0] + t[-1]) / 2
         for which, words in ((early, "after the release"), (late, "in the second half")):
@@ -231,43 +231,49 @@ class Judged:
             if which is late and sign * slope > abs(omega0) * 1.05 + 6 * spread and sign * meant < abs(omega0):
                 raise UnsoundError(
                     f"{film.label}: the bottle turns faster late ({slope:.3g} rad/s) than at its release "
-                    f"({omega0:.3g} rad/s): click the frames around {one.best['release']:.3f} s again"
+                    f"({omega0:.3g} rad/s): click the frames around {estimate.best['release']:.3f} s again"
                 )
 
     def lines(self) -> list[str]:
         """Return the estimate in lines for a terminal."""
-        one, film = self.estimate, self.estimate.film
+        estimate, film = self.estimate, self.estimate.film
         inside = self.estimate.flying
-        doubted = sorted({int(film.lines[k]) for k in np.flatnonzero(one.doubted.any(axis=0))})
-        found = [
-            f"{one.solver}, {one.throw.n_slices} slices: {int(inside.sum())} frames in flight, "
+        doubted = sorted({int(film.lines[k]) for k in np.flatnonzero(estimate.doubted.any(axis=0))})
+        lines = [
+            f"{estimate.solver}, {estimate.throw.n_slices} slices: {int(inside.sum())} frames in flight, "
             f"{int((inside & ~film.clicked.all(axis=0)).sum())} with a point missing, "
             + (f"clicks doubted in lines {', '.join(map(str, doubted))}" if doubted else "no click doubted")
         ]
         for name in SHOWN:
-            if name not in one.draws or (film.quantity == "omega" and name == "theta0"):
+            if name not in estimate.draws or (film.quantity == "omega" and name == "theta0"):
                 continue
-            if name == "touch" and not (one.touched and one.likelihood.two):
+            if name == "touch" and not (estimate.touched and estimate.likelihood.two):
                 continue
-            if name == "release" and one.likelihood.held.release is not None:
-                found.append(f"  {name:12} {one.likelihood.held.release:.6g} s, held")
+            if name == "release" and estimate.likelihood.held.release is not None:
+                lines.append(f"  {name:12} {estimate.likelihood.held.release:.6g} s, held")
                 continue
-            found.append(f"  {name:12} {self.number(name)}{self._remark(name)}")
-        pair = float(np.corrcoef(one.draws["gamma"], one.draws["release"])[0, 1]) if one.held.release is None else 0.0
-        if abs(pair) > 0.5 and one.likelihood.two:
-            found.append(f"  correlation  gamma with release {pair:+.2f}: their intervals hang together")
-        return [*found, f"  residuals    {self.words}"]
+            lines.append(f"  {name:12} {self.number(name)}{self._remark(name)}")
+        pair = (
+            float(np.corrcoef(estimate.draws["gamma"], estimate.draws["release"])[0, 1])
+            if estimate.held.release is None
+            else 0.0
+        )
+        if abs(pair) > 0.5 and estimate.likelihood.two:
+            lines.append(f"  correlation  gamma with release {pair:+.2f}: their intervals hang together")
+        return [*lines, f"  residuals    {self.words}"]
 
     def number(self, name: str) -> str:
         """Return the median of a parameter, its interval and its unit."""
-        one = self.estimate
-        low, high = one.interval(name)
+        estimate = self.estimate
+        low, high = estimate.interval(name)
         factor, unit = 1.0, UNITS[name]
         if name == "noise":
-            factor, unit = {"points": (1e3, "mm"), "theta": (1.0, "rad"), "omega": (1.0, "rad/s")}[one.film.quantity]
+            factor, unit = {"points": (1e3, "mm"), "theta": (1.0, "rad"), "omega": (1.0, "rad/s")}[
+                estimate.film.quantity
+            ]
         width = factor * (high - low)
         places = min(9, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
-        numbers = [f"{factor * value:.{places}f}" for value in (one.best[name], low, high)]
+        numbers = [f"{factor * value:.{places}f}" for value in (estimate.best[name], low, high)]
         return f"{numbers[0]} [{numbers[1]}, {numbers[2]}] {unit}".rstrip()
 
     def _remark(self, name: str) -> str:
@@ -311,8 +317,10 @@ def nearest_turn(angle: FloatArray, near: FloatArray) -> FloatArray:
 
 def ranked(all_: Sequence[Judged]) -> list[Judged]:
     """Return the equations by their evidence, the best first, each with how far it is behind."""
-    best = max(one.estimate.evidence for one in all_)
-    return sorted((replace(one, behind=best - one.estimate.evidence) for one in all_), key=lambda one: one.behind)
+    best = max(judged.estimate.evidence for judged in all_)
+    return sorted(
+        (replace(judged, behind=best - judged.estimate.evidence) for judged in all_), key=lambda judged: judged.behind
+    )
 
 
 def compared(all_: Sequence[Judged]) -> str:
@@ -338,7 +346,7 @@ def together(films: Sequence[Judged]) -> tuple[dict[str, FloatArray], str]:
     The films' posteriors of (gamma, e), which are densities smoothed by kernels, are multiplied: each has the same
     flat prior, and all else is a film's own.
     """
-    pairs = [np.array([one.estimate.draws["gamma"], one.estimate.draws["restitution"]]) for one in films]
+    pairs = [np.array([judged.estimate.draws["gamma"], judged.estimate.draws["restitution"]]) for judged in films]
     ends = np.array([[shortest(row, 0.999) for row in pair] for pair in pairs])
     low, high = ends[:, :, 0].min(axis=0), ends[:, :, 1].max(axis=0)
     axes = [np.linspace(low[k], high[k], 161) for k in range(2)]
@@ -351,7 +359,7 @@ def together(films: Sequence[Judged]) -> tuple[dict[str, FloatArray], str]:
     picked = mesh[:, rng.choice(len(chance), DRAWS, p=chance / chance.sum())]
     step = np.array([[axis[1] - axis[0]] for axis in axes])
     low_high = [shortest(pair[0], 0.95) for pair in pairs]
-    apart = max(one[0] for one in low_high) > min(one[1] for one in low_high)
+    apart = max(interval[0] for interval in low_high) > min(interval[1] for interval in low_high)
     words = "their intervals of gamma do not meet: not one bottle, or not this equation" if apart else "the films agree"
     shared = picked + (rng.random(picked.shape) - 0.5) * step
     return {"gamma": shared[0], "restitution": np.clip(shared[1], 0.0, 1.0)}, words

@@ -155,18 +155,18 @@ class Likelihood:
     def _priors(self) -> tuple[FloatArray, FloatArray]:
         """Return what priors expect, and their inverse variances, 0 where there is none; each (K,)."""
         held, noise = self.held, self.noise if self.held.noise is None else self.held.noise
-        known = {"log_noise": (float(np.log(noise)), 3.0 if held.noise is None else TIGHT)}
+        priors = {"log_noise": (float(np.log(noise)), 3.0 if held.noise is None else TIGHT)}
         if held.release is not None:
-            known["release"] = held.release, TIGHT
+            priors["release"] = held.release, TIGHT
         if self.two:
-            known["log_hand"] = float(np.log(HAND[0])), HAND[1]
-            known |= {name: (0.0, size) for name, size in zip(("pull_x", "pull_y", "twist"), PULL, strict=True)}
+            priors["log_hand"] = float(np.log(HAND[0])), HAND[1]
+            priors |= {name: (0.0, size) for name, size in zip(("pull_x", "pull_y", "twist"), PULL, strict=True)}
             if held.tilt:
-                known["ax"] = 0.0, TIGHT
+                priors["ax"] = 0.0, TIGHT
         elif self.film.quantity == "omega":
-            known["theta0"] = 0.0, 1.0
+            priors["theta0"] = 0.0, 1.0
         expected, stiffness = np.zeros(len(self.index)), np.zeros(len(self.index))
-        for name, (value, deviation) in known.items():
+        for name, (value, deviation) in priors.items():
             expected[self.index[name]], stiffness[self.index[name]] = value, deviation**-2
         return expected, stiffness
 

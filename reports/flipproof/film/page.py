@@ -25,18 +25,18 @@ DOUBTED: Final = {"color": "#d55e00", "marker": "x", "linestyle": "none", "marke
 
 def track_csv(judged: Judged) -> str:
     """Return a film and its fit as the text of a track.csv (``clip.SCHEMA``)."""
-    one = judged.estimate
-    film, t, (theta_fit, omega_fit) = one.film, one.film.t, judged.fitted
-    inside = one.flying
-    release, touch = one.best["release"], one.best["touch"]
+    estimate = judged.estimate
+    film, t, (theta_fit, omega_fit) = estimate.film, estimate.film.t, judged.fitted
+    inside = estimate.flying
+    release, touch = estimate.best["release"], estimate.best["touch"]
     points = np.full((2, len(t), 2), np.nan)
     misses, doubted = np.full((2, len(t)), np.nan), np.zeros((2, len(t)), dtype=np.bool_)
     theta = judged.theta
-    outside = np.where(t < one.fit.x[0], theta_fit, np.nan)
+    outside = np.where(t < estimate.fit.x[0], theta_fit, np.nan)
     theta = np.where(np.isnan(outside) & ~inside, _unwound(film.angle, theta), theta)
     if film.quantity == "points":
-        points, doubted = film.values, one.doubted
-        _, _, missed = one.likelihood.pieces(one.curve, one.fit.x)
+        points, doubted = film.values, estimate.doubted
+        _, _, missed = estimate.likelihood.pieces(estimate.curve, estimate.fit.x)
         misses = np.where(film.clicked & inside, np.hypot(*np.moveaxis(missed, 2, 0)), np.nan)
     cut = np.where(inside, 1.0, np.nan)
     columns = (
@@ -48,9 +48,9 @@ def track_csv(judged: Judged) -> str:
 
 def _unwound(angle: FloatArray, theta: FloatArray) -> FloatArray:
     """Return angles with turns counted from frame to frame."""
-    known = ~np.isnan(angle)
+    finite = ~np.isnan(angle)
     out = theta.copy()
-    out[known] = np.unwrap(theta[known])
+    out[finite] = np.unwrap(theta[finite])
     return out
 
 
@@ -58,7 +58,7 @@ def _unwound(angle: FloatArray, theta: FloatArray) -> FloatArray:
 def figure_film(all_: Sequence[Judged]) -> Figure:
     """Clicked and fitted angle with release and touch above; what each equation leaves below."""
     best = all_[0]
-    one, film = best.estimate, best.estimate.film
+    nearest, film = best.estimate, best.estimate.film
     t = film.t
     figure, (above, *below) = new_figure(
         1 + len(all_), size=(8.0, 3.6 + 1.5 * len(all_)), sharex=True,
@@ -67,20 +67,20 @@ def figure_film(all_: Sequence[Judged]) -> Figure:
     omega = film.quantity == "omega"
     measured = film.values[0, :, 0] if omega else best.theta
     above.plot(t, measured, label="measured", **MEASURED)
-    bad = one.doubted.any(axis=0)
+    bad = nearest.doubted.any(axis=0)
     above.plot(t[bad], measured[bad], label="doubted", **DOUBTED)
     scale, unit = (1.0, "rad/s") if omega else (180 / np.pi, "degrees")
     for k, (axes, judged) in enumerate(zip(below, all_, strict=True)):
-        other = judged.estimate
-        look = solver_style("eq8" if other.solver == "midpoint" else other.solver, k)
-        inside = other.flying
-        above.plot(t[inside], judged.fitted[int(omega)][inside], label=other.solver, **look)
+        estimate = judged.estimate
+        look = solver_style("eq8" if estimate.solver == "midpoint" else estimate.solver, k)
+        inside = estimate.flying
+        above.plot(t[inside], judged.fitted[int(omega)][inside], label=estimate.solver, **look)
         axes.axhline(0.0, color="#444444", linewidth=0.8)
         axes.plot(t[judged.flying], scale * judged.missed, ".", color=look["color"], markersize=4)
-        axes.set_title(f"{other.solver}: measured − fitted [{unit}]", fontsize=9, loc="left")
+        axes.set_title(f"{estimate.solver}: measured − fitted [{unit}]", fontsize=9, loc="left")
     for name, colour in (("release", "#0072b2"), ("touch", "#d55e00")):
-        low, high = one.interval(name)
-        if name == "release" or (one.touched and one.likelihood.two):
+        low, high = nearest.interval(name)
+        if name == "release" or (nearest.touched and nearest.likelihood.two):
             for axes in (above, *below):
                 axes.axvspan(low, max(high, low + 1e-4), color=colour, alpha=0.35, linewidth=0)
             above.annotate(name, (low, 0.02), xycoords=("data", "axes fraction"), color=colour, fontsize=9)
@@ -95,14 +95,14 @@ def figure_allowed(all_: Sequence[Judged]) -> Figure:
     """Draws of drag and restitution that the film allows under each equation."""
     figure, grid = new_figure(1, len(all_), size=(max(4.5, 3.6 * len(all_)), 3.6), squeeze=False)
     for k, (axes, judged) in enumerate(zip(grid[0], all_, strict=True)):
-        one = judged.estimate
-        colour = solver_style("eq8" if one.solver == "midpoint" else one.solver, k)["color"]
+        estimate = judged.estimate
+        colour = solver_style("eq8" if estimate.solver == "midpoint" else estimate.solver, k)["color"]
         axes.plot(
-            one.draws["gamma"][::4], one.draws["restitution"][::4], ".", color=colour, markersize=2, alpha=0.4,
-            rasterized=True,
+            estimate.draws["gamma"][::4], estimate.draws["restitution"][::4], ".", color=colour, markersize=2,
+            alpha=0.4, rasterized=True,
         )  # fmt: skip
         axes.set_xlabel("γ = α/2m [/s]")
-        axes.set_title(one.solver, fontsize=10, loc="left")
+        axes.set_title(estimate.solver, fontsize=10, loc="left")
         axes.set_ylim(0, 1)
     grid[0][0].set_ylabel("restitution e [1]")
     return figure
@@ -124,25 +124,26 @@ def summary(all_: Sequence[Judged], provenance: Mapping[str, str]) -> dict[str, 
 
 
 def _fit(judged: Judged) -> dict[str, Any]:
-    one = judged.estimate
-    names = [name for name in SHOWN if name in one.draws]
+    estimate = judged.estimate
+    names = [name for name in SHOWN if name in estimate.draws]
     return {
-        "model": one.solver,
-        "slices": one.throw.n_slices,
+        "model": estimate.solver,
+        "slices": estimate.throw.n_slices,
         "parameters": [
-            {"name": name, "unit": UNITS[name], "value": one.best[name], "low": one.interval(name)[0],
-             "high": one.interval(name)[1], "verdict": judged.verdict(name)} for name in names
+            {"name": name, "unit": UNITS[name], "value": estimate.best[name], "low": estimate.interval(name)[0],
+             "high": estimate.interval(name)[1], "verdict": judged.verdict(name)} for name in names
         ],
-        "correlation": np.corrcoef([one.draws[name] for name in ("gamma", "restitution", "omega0", "release")]).tolist()
-        if one.held.release is None and one.likelihood.two else None,
+        "correlation": np.corrcoef(
+            [estimate.draws[name] for name in ("gamma", "restitution", "omega0", "release")]
+        ).tolist() if estimate.held.release is None and estimate.likelihood.two else None,
         "explains": judged.explained,
         "discrepancy": judged.discrepancy,
         "own_noise": judged.own_noise,
         "runs": judged.runs,
-        "evidence": one.evidence,
-        "frames": one.film.t[one.flying].tolist(),
-        "doubted_lines": one.film.lines[one.doubted.any(axis=0)].tolist(),
-        "flights": one.flights,
+        "evidence": estimate.evidence,
+        "frames": estimate.film.t[estimate.flying].tolist(),
+        "doubted_lines": estimate.film.lines[estimate.doubted.any(axis=0)].tolist(),
+        "flights": estimate.flights,
     }  # fmt: skip
 
 

@@ -106,7 +106,7 @@ class Certificate:
     def conclusion(self) -> str:
         """The last line: how many checks there were, what became of them, and of which throws that is true."""
         counts = {v: [r for r in self.results if r.verdict == v] for v in (PASSED, WEAK, FAILED, EXPECTED, WAITING)}
-        parts = [f"{len(found)} {v}" for v, found in counts.items() if found or v in (PASSED, FAILED)]
+        parts = [f"{len(results)} {v}" for v, results in counts.items() if results or v in (PASSED, FAILED)]
         idle: dict[str, list[str]] = {}
         for result in self.results:
             if result.verdict == IDLE:
@@ -114,8 +114,8 @@ class Certificate:
         if idle:
             reasons = "; ".join(f"{', '.join(checks)}: {reason}" for reason, checks in idle.items())
             parts.append(f"{sum(map(len, idle.values()))} not applicable ({reasons})")
-        asked = f"; asked were {domain_text(self.domain)}" if self.domain else ""
-        return f"{len(self.results)} checks: {', '.join(parts)}{asked}"
+        domain = f"; asked were {domain_text(self.domain)}" if self.domain else ""
+        return f"{len(self.results)} checks: {', '.join(parts)}{domain}"
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the passport: what the solver says of itself, what was found, and under which versions."""
@@ -194,8 +194,8 @@ class _Asked(Runner):
             self.unanswered = ask
             raise
         for name, (_, value) in VARIED.items():
-            here = np.append(value(ask), self.domain.get(name, ()))
-            self.domain[name] = float(here.min()), float(here.max())
+            values = np.append(value(ask), self.domain.get(name, ()))
+            self.domain[name] = float(values.min()), float(values.max())
         return answer
 
 
@@ -219,62 +219,68 @@ def certify(
     for name in traits.expected_failures:
         if name not in CHECKS:
             raise ForeignError(unknown_name("expected_failures: check", name, CHECKS))
-    asked, names = _Asked(runner), tuple(checks)
+    recorder, names = _Asked(runner), tuple(checks)
     results: list[Result] = []
-    made: dict[str, Check] = {**CHECKS, "elsewhere": partial(elsewhere.check_elsewhere, seed=seed)}
+    suite: dict[str, Check] = {**CHECKS, "elsewhere": partial(elsewhere.check_elsewhere, seed=seed)}
     for name in names:
-        result = _result(name, made[name], traits, asked)
+        result = _result(name, suite[name], traits, recorder)
         if result.verdict == FAILED and result.found is None:
-            same = [one.check for one in results if one.found is None and one.reason.startswith(result.reason)]
+            same = [
+                earlier.check
+                for earlier in results
+                if earlier.found is None and earlier.reason.startswith(result.reason)
+            ]
             result = replace(result, reason=f"as in {same[0]}") if same else result
         results.append(result)
         say(results[-1])
         if until_failed and results[-1].verdict == FAILED:
-            return Certificate(traits=declared, results=tuple(results), domain=asked.domain)
+            return Certificate(traits=declared, results=tuple(results), domain=recorder.domain)
         if name == "digits" and results[-1].verdict == WEAK and results[-1].found is not None:
             traits = replace(traits, precision=results[-1].found.facts["precision"])
     if names == tuple(CHECKS):
         results.append(_enough(results))
         say(results[-1])
-    return Certificate(traits=declared, results=tuple(results), domain=asked.domain)
+    return Certificate(traits=declared, results=tuple(results), domain=recorder.domain)
 
 
-def _result(name: str, check: Check, traits: Traits, asked: _Asked) -> Result:
+def _result(name: str, check: Check, traits: Traits, recorder: _Asked) -> Result:
     result = partial(Result, check=name, title=(CHECKS[name].__doc__ or "").partition("\n")[0])
-    known = traits.expected_failures.get(name)
+    reason = traits.expected_failures.get(name)
     try:
-        found = drive(check(traits), asked.again if name in ("determinism", "inputs") else asked)
+        found = drive(check(traits), recorder.again if name in ("determinism", "inputs") else recorder)
     except WaitingError as why:
         return result(verdict=WAITING, reason=str(why))
     except NotApplicableError as why:
         return result(verdict=IDLE, reason=str(why))
     except ForeignError as error:
-        words = f"{error}; known: {known}" if known else f"{error}{_answered_without(asked)}"
-        return result(verdict=FAILED if known is None else EXPECTED, reason=words)
-    if found.holds and known is not None:
-        return result(verdict=FAILED, found=found, reason=f"declared as a failure ({known}), but holds")
+        words = f"{error}; known: {reason}" if reason else f"{error}{_answered_without(recorder)}"
+        return result(verdict=FAILED if reason is None else EXPECTED, reason=words)
+    if found.holds and reason is not None:
+        return result(verdict=FAILED, found=found, reason=f"declared as a failure ({reason}), but holds")
     if found.holds:
         return result(verdict=WEAK if found.weak else PASSED, found=found)
-    return result(verdict=FAILED if known is None else EXPECTED, found=found, reason=f"known: {known}" if known else "")
+    return result(
+        verdict=FAILED if reason is None else EXPECTED, found=found, reason=f"known: {reason}" if reason else ""
+    )
 
 
-def _answered_without(asked: _Asked) -> str:
+def _answered_without(recorder: _Asked) -> str:
     """Return without what the ask is answered that was not, of rests, weight, drag and impacts, and what to look at.
 
     Asked once a solver, and only if it answers a throw without any of them.
     """
-    ask, asked.unanswered = asked.unanswered, None
-    if ask is None or asked.explained or ask.scenario.frozen:
+    ask, recorder.unanswered = recorder.unanswered, None
+    if ask is None or recorder.explained or ask.scenario.frozen:
         return ""
-    asked.explained = True
+    recorder.explained = True
     throw = ask.scenario
     share = min(1.0, 1.0 / (abs(throw.omega0) * throw.duration))  # a radian, before most impacts
     short = replace(ask, scenario=replace(throw, duration=share * throw.duration), times=share * ask.times)
     bare = replace(short, scenario=replace(short.scenario, gravity=0.0, drag=0.0))
 
-    def answered(one: Ask) -> bool:
+    def answered(variant: Ask) -> bool:
         try:
-            asked(one)
+            recorder(variant)
         except WaitingError:
             raise
         except ForeignError:
@@ -327,12 +333,12 @@ def findings_of(certificate: Certificate, id_: str = "certify-", title: str = ""
 
     The value is 1 if it holds, 0 if not; expected failures, waiting and idle checks are observations.
     """
-    found = []
+    findings = []
     for result in certificate.results:
-        about = f"{id_}{result.check}", f"{title}{result.title.rstrip('.')}"
+        heading = f"{id_}{result.check}", f"{title}{result.title.rstrip('.')}"
         value = None if result.verdict in (IDLE, WAITING) else float(result.verdict != FAILED)
         if result.verdict in (IDLE, WAITING, EXPECTED):
-            found.append(observed(*about, value, note=result.words))
+            findings.append(observed(*heading, value, note=result.words))
         else:
-            found.append(regression(*about, value, "", (1.0, 1.0), result.words))
-    return tuple(found)
+            findings.append(regression(*heading, value, "", (1.0, 1.0), result.words))
+    return tuple(findings)

@@ -145,12 +145,12 @@ def check_inputs(traits: Traits) -> Making:
     others["another start"] = replace(ask, start=stack)
     others["other times"] = replace(ask, times=ask.times**2 / ask.times[-1])
     # The first throw comes again before each: whatever is kept of the last throw alone is kept of that one.
-    asks = [one for other in others.values() for one in (ask, other)]
+    asks = [question for other in others.values() for question in (ask, other)]
     answers = yield asks
     same = [
         words
-        for words, one, other in zip(others, answers[::2], answers[1::2], strict=True)
-        if all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("theta", "omega"))
+        for words, original, changed in zip(others, answers[::2], answers[1::2], strict=True)
+        if all(np.array_equal(getattr(original, name), getattr(changed, name)) for name in ("theta", "omega"))
     ]
     return Found(
         holds=not same,
@@ -165,17 +165,21 @@ def check_inputs(traits: Traits) -> Making:
 def check_times(traits: Traits) -> Making:
     """The answer is that of the time asked, and does not depend on the other times asked."""
     end, apart = SMOOTH.duration, SMOOTH.duration / 3000  # a third of a step
-    few = end * np.array([0.2507, 0.5013, 0.7519, 1.0])
-    many = np.union1d([*few, *(few - apart)], end * np.random.default_rng(0).uniform(0.06, 1.0, 40))
-    common = np.searchsorted(many, few)
+    sparse_times = end * np.array([0.2507, 0.5013, 0.7519, 1.0])
+    dense_times = np.union1d(
+        [*sparse_times, *(sparse_times - apart)], end * np.random.default_rng(0).uniform(0.06, 1.0, 40)
+    )
+    common = np.searchsorted(dense_times, sparse_times)
     levels = (0, -1) if traits.refined_by else (0,)
-    asks = [replace(ask_of(traits, SMOOTH, level), times=times) for level in levels for times in (few, many)]
+    asks = [
+        replace(ask_of(traits, SMOOTH, level), times=times) for level in levels for times in (sparse_times, dense_times)
+    ]
     # The end alone: some solvers take so many steps from one output to the next and no more.
-    one, other, *coarser, alone = yield [*asks, replace(ask_of(traits, SMOOTH), times=few[-1:])]
+    sparse, dense, *coarser, alone = yield [*asks, replace(ask_of(traits, SMOOTH), times=sparse_times[-1:])]
     scale = {"omega": abs(SMOOTH.omega0), "theta": 1.0}
     worst, off, room = "", np.zeros(4), np.ones(4)
     for name in scale:
-        a, b = getattr(one, name), getattr(other, name)[common]
+        a, b = getattr(sparse, name), getattr(dense, name)[common]
         own = np.abs(getattr(coarser[0], name) - a) / scale[name] if coarser else np.full(4, 1e-3)
         mine, allowed = np.abs(a - b) / scale[name], max(1e-5, 64 * traits.epsilon) + 5 * np.maximum.accumulate(own)
         mine[-1] = max(mine[-1], abs(getattr(alone, name)[0] - a[-1]) / scale[name])
@@ -185,22 +189,22 @@ def check_times(traits: Traits) -> Making:
         if np.max(mine / allowed) > np.max(off / room) or not worst:
             worst, off, room = name, mine, allowed
     came = f"{worst} differs by {off.max():.2g}"
-    where = f"asked at {len(few)} times, at {len(many)} uneven ones, and at the end alone"
+    where = f"asked at {len(sparse_times)} times, at {len(dense_times)} uneven ones, and at the end alone"
     if np.all(off <= room):
-        before = np.searchsorted(many, few - apart)
-        turned = apart * (other.omega[common] + other.omega[before]) / 2
-        went, least = np.abs(other.theta[common] - other.theta[before] - turned), max(1e-5, 64 * traits.epsilon)
+        before = np.searchsorted(dense_times, sparse_times - apart)
+        turned = apart * (dense.omega[common] + dense.omega[before]) / 2
+        went, least = np.abs(dense.theta[common] - dense.theta[before] - turned), max(1e-5, 64 * traits.epsilon)
         if not went.max() <= least:
             off, room = went, np.full(4, least)
             came = f"theta advances by {went.max():.2g} rad more or less than omega says"
             where = f"between two times that are {apart:.2g} s apart"
     holds = bool(np.all(off <= room))
-    advice = "" if holds else (yield from _of_outputs(traits, one, other.omega[common]))
+    advice = "" if holds else (yield from _of_outputs(traits, sparse, dense.omega[common]))
     return Found(
         holds=holds,
         expected=f"the same within {room.max():.1g}, its own error",
         came=came,
-        where=f"{where}, {when(few, off)}",
+        where=f"{where}, {when(sparse_times, off)}",
         advice=f"{advice}the flight begins at t = 0, also if that is not asked; "
         "go exactly to each of ask.times, uneven as they are: cut the last step short, and leave nothing out",
         facts={"times": float(off.max())},
@@ -395,7 +399,7 @@ def check_momentum(traits: Traits) -> Making:
     holds, advice = sizes[0] <= LOCATED * bound or falls, ""
     if not holds:
         simpler = [ask_of(traits, throw) for throw in SIMPLER.values()]
-        drifts = [float(_drift(*one).max()) for one in zip(simpler, (yield simpler), strict=True)]
+        drifts = [float(_drift(*pair).max()) for pair in zip(simpler, (yield simpler), strict=True)]
         advice = _right_without(drifts, max(bound, 0.03 * sizes[0]))
     return Found(
         holds=holds,
@@ -443,8 +447,8 @@ def _at_a_quarter(sizes: Sequence[float], unit: str = "") -> str:
 
 def check_mirror(traits: Traits) -> Making:
     """A throw mirrored left to right has the mirrored flight: -theta, -omega, the same r."""
-    one, other = yield _mirrored(traits, THROW)
-    change = _unlike(one, other)
+    original, mirrored = yield _mirrored(traits, THROW)
+    change = _unlike(original, mirrored)
     bound = max(1e-9, 1024 * traits.epsilon)  # the launch is not mirrored, and round-off grows with every impact
     holds, advice = float(change.max()) <= bound, ""
     if not holds:
@@ -455,7 +459,7 @@ def check_mirror(traits: Traits) -> Making:
         holds=holds,
         expected=f"omega -> -omega within {bound:.1g} of omega_0",
         came=f"off by {change.max():.2g}",
-        where=when(one.t, change),
+        where=when(original.t, change),
         advice=f"{advice}look for abs(omega), a sign of theta, another angle than theta in the weight, or a place that "
         "assumes omega > 0",
     )
@@ -463,18 +467,18 @@ def check_mirror(traits: Traits) -> Making:
 
 def _mirrored(traits: Traits, throw: Scenario) -> list[Ask]:
     """Return the ask for a throw and that for its mirror image."""
-    return [ask_of(traits, one) for one in (throw, replace(throw, theta0=-throw.theta0, omega0=-throw.omega0))]
+    return [ask_of(traits, variant) for variant in (throw, replace(throw, theta0=-throw.theta0, omega0=-throw.omega0))]
 
 
-def _unlike(one: Answer, other: Answer) -> FloatArray:
+def _unlike(original: Answer, mirrored: Answer) -> FloatArray:
     """Return how far omega is from that of the mirror image, fraction of omega_0."""
-    return np.asarray(np.abs(one.omega + other.omega) / abs(THROW.omega0))
+    return np.asarray(np.abs(original.omega + mirrored.omega) / abs(THROW.omega0))
 
 
 def check_moving_frame(traits: Traits) -> Making:
     """A bottle thrown with another velocity, and so seen from a moving frame, turns alike."""
-    one, other = yield [ask_of(traits, THROW), ask_of(traits, replace(THROW, launch_velocity=(3.0, -1.0)))]
-    change = shift(one, other, THROW.omega0)
+    original, moving = yield [ask_of(traits, THROW), ask_of(traits, replace(THROW, launch_velocity=(3.0, -1.0)))]
+    change = shift(original, moving, THROW.omega0)
     bound = max(1e-7, 1024 * traits.epsilon)
     return Found(
         holds=change <= bound,
@@ -494,22 +498,22 @@ def check_gravity(traits: Traits) -> Making:
         raise NotApplicableError("told by the check of the equation")
     light, without = (replace(THROW, gravity=g) for g in (THROW.gravity / 2, 0.0))
     for levels in ((1, 0), (3, 2)) if traits.refined_by else ((0,),):
-        one, other, *coarser = yield [ask_of(traits, throw, level) for level in levels for throw in (light, without)]
-        exact = [curve(traits.equation, throw, one.t).omega / THROW.omega0 for throw in (light, without)]
-        measured, expected = (one.omega - other.omega) / THROW.omega0, exact[0] - exact[1]
-        own = sum(shift(a, b, THROW.omega0) for a, b in zip((one, other), coarser, strict=False))
+        half, free, *coarser = yield [ask_of(traits, throw, level) for level in levels for throw in (light, without)]
+        exact = [curve(traits.equation, throw, half.t).omega / THROW.omega0 for throw in (light, without)]
+        measured, expected = (half.omega - free.omega) / THROW.omega0, exact[0] - exact[1]
+        own = sum(shift(a, b, THROW.omega0) for a, b in zip((half, free), coarser, strict=False))
         room = max(1e-4, 1024 * traits.epsilon, 4 * own) + (0.0 if coarser else place.room)
         off = np.abs(measured - expected)
         if float(off.max()) <= room <= 1e-3:
             break
-    weightless = float(np.max(np.abs(other.omega / THROW.omega0 - exact[1])))
+    weightless = float(np.max(np.abs(free.omega / THROW.omega0 - exact[1])))
     if float(off.max()) > room and weightless > room:
         raise NotApplicableError("without weight omega is wrong, too: told by the check elsewhere")
     return Found(
         holds=float(off.max()) <= room,
         expected=f"omega changes by {np.abs(expected).max():.2g} of omega_0 at most, as in {traits.equation}",
         came=f"by {np.abs(measured).max():.2g} at most, {off.max():.2g} off at one time (room {room:.1g})",
-        where=f"g = {light.gravity:g} against 0 m/s^2, {when(one.t, off)}",
+        where=f"g = {light.gravity:g} against 0 m/s^2, {when(half.t, off)}",
         advice="the weight term is proportional to the throw's gravity: look for a constant or a switch",
         facts={"gravity": float(np.abs(measured).max())},
     )
@@ -549,25 +553,25 @@ def ask_of_vector(vector: Vector, traits: Traits) -> Ask:
 
 def check_equation(traits: Traits) -> Making:
     """The solver is nearest to the equation it declares, and no farther from it than its own error explains."""
-    found = yield from placing(traits)
+    place = yield from placing(traits)
     if traits.equation is None:
-        raise NotApplicableError(f"none is declared; {found.text}")
+        raise NotApplicableError(f"none is declared; {place.text}")
     try:
         declared = name_of(switches_of(traits.equation))
     except ValueError as error:
         raise NotApplicableError(str(error)) from None
-    holds = found.equation == declared and found.on_lattice
+    holds = place.equation == declared and place.on_lattice
     strict = (yield from elsewhere.on_the_paper(traits, declared)) if holds else ""
-    own, hidden = found.change or 0.0, found.following_distance / 4
+    own, hidden = place.change or 0.0, place.following_distance / 4
     weak = f"its own error, {own:.2g} of omega_0, is too large to tell equations apart" if own > hidden else ""
     advice = "" if holds and not strict else (yield from elsewhere.simplified(traits, declared))
-    advice = advice or (found.advice and f"{found.advice}; ")
+    advice = advice or (place.advice and f"{place.advice}; ")
     return Found(
         holds=holds and not strict,
         expected=declared,
-        came=found.text + (f", but {strict}" if strict else ""),
+        came=place.text + (f", but {strict}" if strict else ""),
         where=f"{len(THROWS)} throws of {THROWS[0].duration:g} to {THROWS[-1].duration:g} s",
         advice=f"{advice}flipproof explain compares it with the declared equation, switch by switch",
         weak=weak,
-        facts={"place": found.to_mapping()},
+        facts={"place": place.to_mapping()},
     )

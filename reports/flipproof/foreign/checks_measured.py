@@ -41,8 +41,8 @@ def check_digits(traits: Traits) -> Making:
     """Numbers have the digits of the precision that is declared."""
     (answer,) = yield [ask_of(traits, THROW, points=121)]
     values = {name: getattr(answer, name) for name in FIELDS if getattr(answer, name) is not None}
-    values = {name: each[1:].ravel() for name, each in values.items() if len(np.unique(each)) >= 20}
-    digits = min((_digits(each) for each in values.values()), default=17)
+    values = {name: numbers[1:].ravel() for name, numbers in values.items() if len(np.unique(numbers)) >= 20}
+    digits = min((_digits(numbers) for numbers in values.values()), default=17)
     singles = _singles(answer)
     facts: dict[str, Any] = {"digits": digits, "arithmetic": "float32" if singles else None}
     expected = f"numbers of {traits.precision}"
@@ -123,14 +123,14 @@ def _error(traits: Traits, answer: Answer) -> Generator[Sequence[Ask], Sequence[
     return shift(answer, curve(place.equation, THROW, answer.t), THROW.omega0) if place.on_lattice else None
 
 
-def _change(one: Answer, other: Answer) -> float:
+def _change(coarse: Answer, fine: Answer) -> float:
     """Return the largest difference of omega and theta, each as a fraction of its scale."""
-    return max(shift(one, other, THROW.omega0), _apart(one, other, "theta"))
+    return max(shift(coarse, fine, THROW.omega0), _apart(coarse, fine, "theta"))
 
 
-def _apart(one: Answer, other: Answer, name: str) -> float:
+def _apart(coarse: Answer, fine: Answer, name: str) -> float:
     """Return the largest difference of a field, fraction of its largest value."""
-    a, b = getattr(one, name), getattr(other, name)
+    a, b = getattr(coarse, name), getattr(fine, name)
     return float(np.max(np.abs(a - b)) / max(float(np.max(np.abs(b))), 1e-300))
 
 
@@ -222,13 +222,13 @@ def check_floor(traits: Traits) -> Making:
         near = [level + math.log2(17 / 16)] if level < deepest and traits.refined_by != "rtol" else []
         coarse = fine
         try:
-            fine, *beside = yield [ask_of(traits, SMOOTH, each) for each in (level, *near)]
+            fine, *beside = yield [ask_of(traits, SMOOTH, depth) for depth in (level, *near)]
         except ForeignError:  # so many steps may take longer than a run may
             break
         changes.append(shift(coarse, fine, SMOOTH.omega0))
-        here = [shift(fine, each, SMOOTH.omega0) for each in beside]
-        noises += here
-        noisy = any(noise > NOISE * changes[-1] for noise in here)
+        level_noises = [shift(fine, neighbour, SMOOTH.omega0) for neighbour in beside]
+        noises += level_noises
+        noisy = any(noise > NOISE * changes[-1] for noise in level_noises)
         stopped = changes[-1] <= 16 * traits.epsilon or changes[-1] > STILL * changes[-2] or noisy
     capped = changes[-1] == 0.0 and len(changes) > 1
     floor = changes[-2] if capped else min(changes)
@@ -256,7 +256,7 @@ def _singles(answer: Answer) -> list[str]:
 
     A number that was printed with nine digits or more is within a tenth of their spacing.
     """
-    found = []
+    names = []
     for name in ("theta", "omega", "r", "v"):
         values = getattr(answer, name)
         if values is None or len(np.unique(values)) < 20:
@@ -264,8 +264,8 @@ def _singles(answer: Answer) -> list[str]:
         with np.errstate(over="ignore", invalid="ignore"):
             nearest = values.astype(np.float32)
             if np.all(np.abs(values - nearest) <= 0.1 * np.spacing(np.abs(nearest))):
-                found.append(name)
-    return found
+                names.append(name)
+    return names
 
 
 # ---------------------------------------------------------------------- restitution
@@ -359,8 +359,10 @@ def check_restitution(traits: Traits) -> Making:
         raise NotApplicableError("no slice reaches an end")
     if traits.refined_by and any(not r.holds for r in curve):
         finer = yield [_ask_of_rebounds(traits, spin, 3) for spin in spins]
-        known = {(r.end, r.spin): r.restitution for r in _rebounds(traits, spins, finer)}
-        change = {key: abs(r.restitution - known[key]) for r in curve if (key := (r.end, r.spin)) in known}
+        restitutions = {(r.end, r.spin): r.restitution for r in _rebounds(traits, spins, finer)}
+        change = {
+            key: abs(r.restitution - restitutions[key]) for r in curve if (key := (r.end, r.spin)) in restitutions
+        }
         curve = [replace(r, room=r.room + min(0.05, 3 * change.get((r.end, r.spin), 0.0))) for r in curve]
     facts: dict[str, Any] = {"restitution": [(r.end, r.speed, r.restitution) for r in curve], "asked": RESTITUTION}
     wrong = [r for r in curve if not r.holds]
@@ -393,15 +395,15 @@ def check_restitution(traits: Traits) -> Making:
 
 def _rebounds(traits: Traits, spins: Sequence[float], answers: Sequence[Answer]) -> list[Rebound]:
     """Return what was measured at both ends; numbers of few digits leave speeds less sure."""
-    found = []
+    rebounds = []
     for end in ("base", "cap"):
         for spin, answer in zip(spins, answers, strict=True):
             throw = throw_of(spin)
-            if (one := measure(answer, throw, end)) is not None:
-                unsure = 4 * traits.epsilon * throw.bottle.length / float(answer.t[1] - answer.t[0]) / one.speed
+            if (rebound := measure(answer, throw, end)) is not None:
+                unsure = 4 * traits.epsilon * throw.bottle.length / float(answer.t[1] - answer.t[0]) / rebound.speed
                 if unsure < RESTITUTION / 4:  # else it is too slow to be measured
-                    found.append(replace(one, room=RESTITUTION_ROOM + unsure))
-    return found
+                    rebounds.append(replace(rebound, room=RESTITUTION_ROOM + unsure))
+    return rebounds
 
 
 def _ask_of_rebounds(traits: Traits, spin: float, level: int = 2) -> Ask:
@@ -413,18 +415,18 @@ def _threshold(
 ) -> Generator[Sequence[Ask], Sequence[Answer], tuple[float, float] | None]:
     """Return speeds [m/s] between which rebounds begin, if slow impacts have none and fast ones the right one."""
     for end in ("cap", "base"):
-        here = sorted((r for r in curve if r.end == end), key=lambda r: r.speed)
-        dead = [r for r in here if abs(r.restitution) < RESTITUTION / 4]
-        live = [r for r in here if abs(r.restitution - RESTITUTION) <= 4 * RESTITUTION_ROOM]
-        if not dead or not live or dead[-1].speed > live[0].speed or len(dead) + len(live) < len(here):
+        rebounds = sorted((r for r in curve if r.end == end), key=lambda r: r.speed)
+        dead = [r for r in rebounds if abs(r.restitution) < RESTITUTION / 4]
+        live = [r for r in rebounds if abs(r.restitution - RESTITUTION) <= 4 * RESTITUTION_ROOM]
+        if not dead or not live or dead[-1].speed > live[0].speed or len(dead) + len(live) < len(rebounds):
             continue
         low, high = dead[-1], live[0]
         for _ in range(5):
             spin = float(np.sqrt(low.spin * high.spin))
             (answer,) = yield [_ask_of_rebounds(traits, spin)]
-            found = measure(answer, throw_of(spin), end)
-            if found is None:
+            rebound = measure(answer, throw_of(spin), end)
+            if rebound is None:
                 break
-            low, high = (found, high) if abs(found.restitution) < RESTITUTION / 4 else (low, found)
+            low, high = (rebound, high) if abs(rebound.restitution) < RESTITUTION / 4 else (low, rebound)
         return low.speed, high.speed
     return None
