@@ -71,8 +71,8 @@ class Adapter:
         AdapterError
             If the adapter raises anything, or they are no flight of the duration asked.
         """
-        asked = map(float, (height, speed, restitution, gravity, dt, duration))
-        answer = _answer(self.ask_drop, dict(zip(PLACES, asked, strict=True)))
+        arguments = map(float, (height, speed, restitution, gravity, dt, duration))
+        answer = _answer(self.ask_drop, dict(zip(PLACES, arguments, strict=True)))
         t, y, v = _arrays(answer, ("t", "y", "v"), (1, 1, 1))
         _check_times(t, dt, duration)
         return t, y, v
@@ -88,7 +88,7 @@ class Adapter:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return t, shape (P,), x and v, shape (P, bodies), of bodies on a line."""
         assert self.ask_line is not None
-        asked = {
+        arguments = {
             "masses": masses,
             "positions": positions,
             "velocities": velocities,
@@ -96,22 +96,23 @@ class Adapter:
             "dt": dt,
             "duration": duration,
         }
-        t, x, v = _arrays(_answer(self.ask_line, asked), ("t", "x", "v"), (1, 2, 2))
+        t, x, v = _arrays(_answer(self.ask_line, arguments), ("t", "x", "v"), (1, 2, 2))
         if x.shape[1] != len(masses):
             raise AdapterError(f"line: x has {x.shape[1]} columns for {len(masses)} bodies")
         _check_times(t, dt, duration)
         return t, x, v
 
 
-def _answer(call: Callable[..., Any], asked: Mapping[str, Any]) -> Any:
+def _answer(call: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
     """Return what an adapter answers; what it raises becomes an AdapterError with the question and the place."""
     try:
-        return call(*asked.values())
+        return call(*arguments.values())
     except AdapterError:
         raise
     except Exception as error:  # of somebody else's code
         question = ", ".join(
-            f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value}" for name, value in asked.items()
+            f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value}"
+            for name, value in arguments.items()
         )
         place = traceback.extract_tb(error.__traceback__)[-1]
         words = shortened(f"{type(error).__name__}: {error}", 200)

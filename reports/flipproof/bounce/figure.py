@@ -19,10 +19,10 @@ def picture(passports: Sequence[Passport]) -> Drawing:
     figure, rows = new_figure(len(passports), 3, size=(9.6, 3.2 * len(passports)), squeeze=False)
     for passport, (law, kept, errors) in zip(passports, rows, strict=True):
         measured = passport["restitution"].numbers
-        for asked, table in zip(measured["asked"], np.array(measured["measured"]), strict=True):
-            (line,) = law.semilogx(measured["speeds_m_s"], table.mean(1), ".-", label=f"e = {asked:g}")
+        for restitution, table in zip(measured["asked"], np.array(measured["measured"]), strict=True):
+            (line,) = law.semilogx(measured["speeds_m_s"], table.mean(1), ".-", label=f"e = {restitution:g}")
             law.fill_between(measured["speeds_m_s"], table.min(1), table.max(1), alpha=0.25, color=line.get_color())
-            law.axhline(asked, color="0.7", linewidth=0.8, zorder=0)
+            law.axhline(restitution, color="0.7", linewidth=0.8, zorder=0)
         law.set(xlabel="speed of impact [m/s]", ylabel="speed after / before")
         law.set_title(passport.settings.get("engine", passport.adapter))
         law.legend(fontsize="x-small", title="asked (grey)", title_fontsize="x-small")

@@ -161,8 +161,8 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
     table = np.array(
         [[[ratio(adapter, v, e, dt, p) for p in PHASES] for v in SPEEDS] for e in RESTITUTIONS]
     )  # (e, speed, phase)
-    asked = np.array(RESTITUTIONS)[:, None, None]
-    off, bounces, sinks = np.abs(table - asked), table > asked / 2, table < -OFF
+    nominal = np.array(RESTITUTIONS)[:, None, None]
+    off, bounces, sinks = np.abs(table - nominal), table > nominal / 2, table < -OFF
     remarks = []
     if sinks.any():
         e, slowest = RESTITUTIONS[int(np.argmax(sinks.any((1, 2))))], SPEEDS[int(np.argmax(sinks.any((0, 2))))]

@@ -61,8 +61,8 @@ def _command(words: list[str], settings: dict[str, str]) -> Drop:
             raise AdapterError(f"cmd: {word!r} names something else than {', '.join(PLACES)} in braces") from None
     answer = _once(words) if any("{" in word for word in words) else _kept(words)
 
-    def drop(*asked: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        lines = answer([repr(number) for number in asked]).splitlines()  # repr: to the last digit
+    def drop(*numbers: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        lines = answer([repr(number) for number in numbers]).splitlines()  # repr: to the last digit
         while lines and lines[0].startswith("#"):
             name, _, value = lines.pop(0).lstrip("# ").partition(" = ")
             settings[name] = value
@@ -83,8 +83,8 @@ def _command(words: list[str], settings: dict[str, str]) -> Drop:
 
 
 def _once(words: list[str]) -> Callable[[list[str]], str]:
-    def answer(asked: list[str]) -> str:
-        given = dict(zip(PLACES, asked, strict=True))
+    def answer(numbers: list[str]) -> str:
+        given = dict(zip(PLACES, numbers, strict=True))
         with tempfile.TemporaryFile() as errors:
             program = _start([word.format(**given) for word in words], subprocess.DEVNULL, errors)
             try:
@@ -113,28 +113,28 @@ def _kept(words: list[str]) -> Callable[[list[str]], str]:
         late.set()
         end(program)
 
-    def answer(asked: list[str]) -> str:
+    def answer(numbers: list[str]) -> str:
         clock, lines = threading.Timer(TIMEOUT, stop), []
         clock.start()
         try:
             with contextlib.suppress(BrokenPipeError):  # it has ended: what it said is still there
-                given.write(" ".join(asked).encode() + b"\n")
+                given.write(" ".join(numbers).encode() + b"\n")
             while (line := answers.readline()).strip():
                 lines.append(line)
         finally:
             clock.cancel()
         if line:
             return "".join(lines)
-        said = "".join(lines[-1:]).strip()
+        last = "".join(lines[-1:]).strip()
         if late.is_set():
             raise AdapterError(
-                f"cmd: no answer that an empty line ends within {TIMEOUT:g} s, but {shortened(said, 60)!r}; "
+                f"cmd: no answer that an empty line ends within {TIMEOUT:g} s, but {shortened(last, 60)!r}; "
                 "is the output flushed?"
             )
         status = program.wait()
         raise AdapterError(
             f"cmd: names no {{height}}, so that it is asked line by line, but it {ending(status)} "
-            f"before an empty line: {_last_line(errors) or shortened(said, 200)!r}"
+            f"before an empty line: {_last_line(errors) or shortened(last, 200)!r}"
         )
 
     weakref.finalize(answer, _close, program, given, answers, errors)

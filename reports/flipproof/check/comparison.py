@@ -62,13 +62,13 @@ class Comparison:
             "notes": list(self.notes),
             "differences": [
                 {
-                    "quantity": one.quantity,
-                    "unit": "omega_0" if one.quantity == "omega" else UNITS[one.quantity],
-                    **dict(zip(("largest", "time"), one.largest, strict=True)),
-                    "times": len(one.t),
-                    "interpolated": one.interpolated,
+                    "quantity": gap.quantity,
+                    "unit": "omega_0" if gap.quantity == "omega" else UNITS[gap.quantity],
+                    **dict(zip(("largest", "time"), gap.largest, strict=True)),
+                    "times": len(gap.t),
+                    "interpolated": gap.interpolated,
                 }
-                for one in self.apart
+                for gap in self.apart
             ],
         }
 
@@ -117,17 +117,17 @@ def table(both: Comparison) -> str:
         a, b = numbers
         lines.append(f"{words:34}{a:{width}.5f}  {b:{width}.5f}  {b - a:+.5f}")
 
-    for one in both.apart:
-        row(f"{SYMBOLS[one.quantity]}({one.t[-1]:.4g} s) [{UNITS[one.quantity]}]", (one.first[-1], one.second[-1]))
-        if one.quantity == "omega":
-            a, b = (plateau(one.t, values, one.scale) for values in (one.first, one.second))
+    for gap in both.apart:
+        row(f"{SYMBOLS[gap.quantity]}({gap.t[-1]:.4g} s) [{UNITS[gap.quantity]}]", (gap.first[-1], gap.second[-1]))
+        if gap.quantity == "omega":
+            a, b = (plateau(gap.t, values, gap.scale) for values in (gap.first, gap.second))
             row("omega/omega_0, mean of second half", (a, b))
-    for one in both.apart:
-        largest, time = one.largest
-        size = f"{largest:.3%} of omega_0" if one.quantity == "omega" else f"{largest:.3g} {UNITS[one.quantity]}"
-        lines.append(f"largest |difference in {SYMBOLS[one.quantity]}|: {size} at t = {time:.5g} s")
-        if one.quantity == "omega":
-            parting = first_crossing(one.t, one.size, PARTING_BAND)
+    for gap in both.apart:
+        largest, time = gap.largest
+        size = f"{largest:.3%} of omega_0" if gap.quantity == "omega" else f"{largest:.3g} {UNITS[gap.quantity]}"
+        lines.append(f"largest |difference in {SYMBOLS[gap.quantity]}|: {size} at t = {time:.5g} s")
+        if gap.quantity == "omega":
+            parting = first_crossing(gap.t, gap.size, PARTING_BAND)
             words = "never" if parting is None else f"{parting:.5g} s"
             lines.append(f"first more than {PARTING_BAND:.0%} of omega_0 apart: {words}")
     return "\n".join(line.replace("\n", r"\n") for line in lines)
@@ -135,7 +135,7 @@ def table(both: Comparison) -> str:
 
 def _times(both: Comparison) -> str:
     """Return at which times the two are compared, and how often one of them is interpolated."""
-    counts = {(len(one.t), one.interpolated) for one in both.apart}
+    counts = {(len(gap.t), gap.interpolated) for gap in both.apart}
     most, interpolated = max(counts)
     if not any(between for _, between in counts):
         return f"compared at {most} times that both have; nothing is interpolated"
@@ -145,11 +145,11 @@ def _times(both: Comparison) -> str:
 def claims(comparison: Comparison, tolerance: float) -> tuple[Finding, ...]:
     """Return the largest differences as findings; the first quantity is held to the tolerance, others are observed."""
     findings: list[Finding] = []
-    for k, one in enumerate(comparison.apart):
-        largest, time = one.largest
-        title = f"largest difference in {SYMBOLS[one.quantity]} between {comparison.first} and {comparison.second}"
-        unit = "of omega_0" if one.quantity == "omega" else UNITS[one.quantity]
-        about = f"compare-{one.quantity.replace('_', '-')}", title, largest, unit
+    for k, gap in enumerate(comparison.apart):
+        largest, time = gap.largest
+        title = f"largest difference in {SYMBOLS[gap.quantity]} between {comparison.first} and {comparison.second}"
+        unit = "of omega_0" if gap.quantity == "omega" else UNITS[gap.quantity]
+        claim = f"compare-{gap.quantity.replace('_', '-')}", title, largest, unit
         note = f"at t = {time:.6g} s"
-        findings.append(observed(*about, note) if k else regression(*about, (0.0, tolerance), note))
+        findings.append(observed(*claim, note) if k else regression(*claim, (0.0, tolerance), note))
     return tuple(findings)

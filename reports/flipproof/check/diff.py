@@ -196,8 +196,8 @@ def change_of(old: Mapping[str, Any], new: Mapping[str, Any], tolerance: float =
 
 def _bands(*findings: Mapping[str, Any]) -> list[float]:
     """Return the bands that findings state, without those that are not finite."""
-    known = [number(finding["band"]) for finding in findings]
-    return [band for band in known if band is not None and math.isfinite(band)]
+    stated = [number(finding["band"]) for finding in findings]
+    return [band for band in stated if band is not None and math.isfinite(band)]
 
 
 def bands(*findings: Mapping[str, Any]) -> float:
@@ -258,9 +258,15 @@ def _circumstances(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[s
     """Yield in what two reports differ, but for what differs between any two."""
     if old["version"] != new["version"]:
         yield f"version of the format: {old['version']} → {new['version']}"
-    made = [s["provenance"] if isinstance(s.get("provenance"), Mapping) else {} for s in (old, new)]
-    before, after = ({"flipproof": s.get("flipproof"), **facts} for s, facts in zip((old, new), made, strict=True))
+    provenances = [s["provenance"] if isinstance(s.get("provenance"), Mapping) else {} for s in (old, new)]
+    before, after = (
+        {"flipproof": s.get("flipproof"), **facts} for s, facts in zip((old, new), provenances, strict=True)
+    )
     for name in dict.fromkeys((*before, *after)):
-        one, other = before.get(name), after.get(name)
-        if name not in ("command", "made", "from the store") and None not in (one, other) and one != other:
-            yield f"{name}: {one} → {other}"
+        old_fact, new_fact = before.get(name), after.get(name)
+        if (
+            name not in ("command", "made", "from the store")
+            and None not in (old_fact, new_fact)
+            and old_fact != new_fact
+        ):
+            yield f"{name}: {old_fact} → {new_fact}"

@@ -83,7 +83,7 @@ def check(
     timeout : float or None - seconds one of their runs may take; None: as each declares
     """
     summary = None if baseline is None else read_summary(baseline)
-    known = {} if summary is None else {finding["id"]: finding for finding in summary["findings"]}
+    old_findings = {} if summary is None else {finding["id"]: finding for finding in summary["findings"]}
     if summary is not None:
         changes = scenario_changes(summary["scenario"], scenario.to_mapping())
         if changes:
@@ -92,26 +92,26 @@ def check(
     if not isinstance(slices, int) or isinstance(slices, bool) or slices < 1:
         raise ValueError(f"{baseline}: slices = {slices!r} must be a whole number of at least 1")
     throw = scenario.with_slices(slices)
-    found: list[Finding] = []
+    findings: list[Finding] = []
     seconds: dict[str, float] = {}
-    asked: list[tuple[str, tuple[Guest, ...]]] = [(group, ()) for group in groups]
-    asked += [("guests", invited(guests, timeout))] if guests else []
+    tasks: list[tuple[str, tuple[Guest, ...]]] = [(group, ()) for group in groups]
+    tasks += [("guests", invited(guests, timeout))] if guests else []
     began = time.perf_counter()
-    for group, others in asked:
+    for group, others in tasks:
         for finding in findings_of(group, throw, store, others):
             began, seconds[finding.id] = time.perf_counter(), time.perf_counter() - began
-            was = known.get(finding.id)
+            was = old_findings.get(finding.id)
             moves = group == "thresholds" or (group == "guests" and finding.kind != "regression")
             if moves and (was is None or (group == "guests" and was["value"] is None)):
                 continue
             held, needs = finding, _threshold(finding.admissible, finding.value)
             if was is not None:
                 held, needs = _held_to(finding, was, tolerance, moves=moves)
-            found.append(held)
+            findings.append(held)
             say(line(held, needs))
-    recomputed = {finding.id for finding in found}
-    left_out = tuple(name for name in known if name not in recomputed) if "thresholds" in groups else ()
-    return Checked(findings=tuple(found), left_out=left_out, seconds=seconds)
+    recomputed = {finding.id for finding in findings}
+    left_out = tuple(name for name in old_findings if name not in recomputed) if "thresholds" in groups else ()
+    return Checked(findings=tuple(findings), left_out=left_out, seconds=seconds)
 
 
 def line(finding: Finding, needs: str) -> str:
@@ -162,10 +162,10 @@ CHECKS: Final[Mapping[str, tuple[str, ...]]] = {
 
 def groups() -> dict[str, tuple[str, ...]]:
     """Return ``CHECKS``, and before the last a group for every other chapter that has the size "check"."""
-    known = {name for names in CHECKS.values() for name in names}
+    covered = {name for names in CHECKS.values() for name in names}
     quick = [chapter.name for part in parts() for chapter in part.chapters if "check" in chapter.work]
     *first, last = CHECKS.items()
-    return dict([*first, *((name, (name,)) for name in quick if name not in known), last])
+    return dict([*first, *((name, (name,)) for name in quick if name not in covered), last])
 
 
 def findings_of(
@@ -175,5 +175,5 @@ def findings_of(
     chapters = ("guests", "differences", "ice") if guests else groups()[group]
     ask = ask_of(throw, "check", throw.n_slices, guests=guests)
     work = {"guests": guests} if guests else None
-    for each in evaluate(gather(chapters_named(*chapters), ask, SerialExecutor(), work=work, store=store)).values():
-        yield from (finding for finding in each.findings if not guests or finding.id.startswith("guest-"))
+    for result in evaluate(gather(chapters_named(*chapters), ask, SerialExecutor(), work=work, store=store)).values():
+        yield from (finding for finding in result.findings if not guests or finding.id.startswith("guest-"))

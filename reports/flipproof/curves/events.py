@@ -55,8 +55,8 @@ def jumps(t: FloatArray, values: FloatArray, least: float) -> Jumps:
     rate = np.divide(change, h, out=np.zeros_like(h), where=h > 0.0)
     padded = np.pad(rate, 2)
     beside = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)
-    found = (change > least) & ((h == 0.0) | ((rate > RATIO * beside) & (h > 0.0)))
-    return Jumps((t[:-1][found] + t[1:][found]) / 2.0, usual)
+    mask = (change > least) & ((h == 0.0) | ((rate > RATIO * beside) & (h > 0.0)))
+    return Jumps((t[:-1][mask] + t[1:][mask]) / 2.0, usual)
 
 
 class Matched(NamedTuple):

@@ -13,15 +13,15 @@ def picture(found: Comparison) -> Drawing:
     """Return the picture, a row for each of the first eight columns."""
     shown = found.columns[:8]
     figure, rows = new_figure(len(shown), 1, size=(8.0, 1.0 + 2.2 * len(shown)), squeeze=False, sharex=True)
-    for each, axes in zip(shown, rows[:, 0], strict=True):
-        size, allowed = (np.where(values > 0.0, values, np.nan) for values in (each.gap.size, each.allowed))
-        axes.semilogy(each.gap.t, size, label="difference")
-        axes.semilogy(each.gap.t, np.where(each.comparable, allowed, np.nan), "--", color="0.4", label="admissible")
-        if each.horizon is not None:
-            axes.axvline(each.horizon, color="#B00020", linestyle=":", label="horizon")
-        if each.parted is not None:
-            axes.axvline(each.parted, color="black", linewidth=1.0, label="they part")
-        axes.set_ylabel("".join(c if c.isprintable() else "?" for c in each.name))
+    for column, axes in zip(shown, rows[:, 0], strict=True):
+        size, allowed = (np.where(values > 0.0, values, np.nan) for values in (column.gap.size, column.allowed))
+        axes.semilogy(column.gap.t, size, label="difference")
+        axes.semilogy(column.gap.t, np.where(column.comparable, allowed, np.nan), "--", color="0.4", label="admissible")
+        if column.horizon is not None:
+            axes.axvline(column.horizon, color="#B00020", linestyle=":", label="horizon")
+        if column.parted is not None:
+            axes.axvline(column.parted, color="black", linewidth=1.0, label="they part")
+        axes.set_ylabel("".join(c if c.isprintable() else "?" for c in column.name))
     rows[0, 0].legend(loc="best")
     rows[-1, 0].set_xlabel("time")
     return draw(figure)

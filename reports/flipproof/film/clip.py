@@ -111,8 +111,8 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     lines = np.array([line for line, _ in rows], dtype=np.int64)
     if "line" in names:
         lines = np.array([int(number_of(path, n, "line", cells[names.index("line")])) for n, cells in rows])
-    known = np.isfinite(numbers[:, 0]) & np.isfinite(numbers[:, 1:]).any(axis=1)
-    numbers, lines = numbers[known], lines[known]
+    filled = np.isfinite(numbers[:, 0]) & np.isfinite(numbers[:, 1:]).any(axis=1)
+    numbers, lines = numbers[filled], lines[filled]
     t = numbers[:, 0]
     if len(t) < MIN_VALUES:
         raise ValueError(f"{path}: {len(t)} rows have a time and a value; {MIN_VALUES} are needed")
@@ -149,14 +149,14 @@ def _of_tracks(table: TrackTable, cap: str, base: str, unit: str, time_unit: str
     )
 
 
-def _length_unit(table: TrackTable, cap: str, base: str, asked: str) -> str:
+def _length_unit(table: TrackTable, cap: str, base: str, requested: str) -> str:
     stated = table.length_unit([cap, base])
-    if stated and asked and stated != asked:
+    if stated and requested and stated != requested:
         raise TrackFileError(
-            f"{table.source}: the headings state lengths in {stated}, the request says {asked}; leave the length unit "
-            "out, or correct the headings"
+            f"{table.source}: the headings state lengths in {stated}, the request says {requested}; leave the length "
+            "unit out, or correct the headings"
         )
-    unit = stated or asked
+    unit = stated or requested
     if unit not in METRES:
         what = f"length_unit = {unit!r} is unknown" if unit else "does not state the unit of x and y"
         raise TrackFileError(

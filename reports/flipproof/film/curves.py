@@ -98,11 +98,11 @@ class Equation:
             return [Curve(row) if np.isfinite(row).all() else None for row in rows]
         sides = ((0, 0), (CHANGE, 0), (-CHANGE, 0), (0, CHANGE), (0, -CHANGE))
         throws = [self._throw(g, e, omega0 * np.exp(a), theta0 + b) for g, e in nodes for a, b in sides]
-        made = self._fly(throws).reshape(len(nodes), 5, 3, -1)
-        slopes = (made[:, 1::2] - made[:, 2::2]) / (2 * CHANGE)
+        flights = self._fly(throws).reshape(len(nodes), 5, 3, -1)
+        slopes = (flights[:, 1::2] - flights[:, 2::2]) / (2 * CHANGE)
         return [
             Curve(rows[0], slope, omega0, theta0) if np.isfinite(rows).all() else None
-            for rows, slope in zip(made, slopes, strict=True)
+            for rows, slope in zip(flights, slopes, strict=True)
         ]
 
     def _throw(self, rate: float, e: float, omega0: float, theta0: float) -> Scenario:
@@ -133,13 +133,13 @@ class Equation:
         if package == "slicemodel":
             from slicemodel.batch import solve_batch
 
-            found: list[Flown] = []
+            flights: list[Flown] = []
             for throw, t in zip(throws, times, strict=True):
                 # The paper's own step, 1000 of them in half a second, and a whole number of them between two values.
                 fine = int(np.ceil(t[1] / 5e-4))
-                one = solve_batch([replace(throw, duration=float(t[-1]))], self.solver, fine * (count - 1) + 1)
-                found.append((one.theta[0, ::fine], one.omega[0, ::fine], one.r_cm[0, ::fine]))
-            return found
+                flight = solve_batch([replace(throw, duration=float(t[-1]))], self.solver, fine * (count - 1) + 1)
+                flights.append((flight.theta[0, ::fine], flight.omega[0, ::fine], flight.r_cm[0, ::fine]))
+            return flights
         from flipproof.foreign.contract import ForeignError
 
         flown: list[Flown | None] = [None] * len(throws)

@@ -74,12 +74,12 @@ def before(film: Film, release: float, touch: float, noise: float) -> Share | No
 
 def _parabola(rows: FloatArray, seen: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
     """Return p, v, a (6,) and their covariance; a is held to gravity within 3 m/s^2, what tilt and scale may change."""
-    known = np.zeros((2, 6))
-    known[0, 4] = known[1, 5] = noise / 3.0
+    prior = np.zeros((2, 6))
+    prior[0, 4] = prior[1, 5] = noise / 3.0
     weight = np.ones(len(seen))
     for _ in range(10):
-        matrix = np.vstack((rows * weight[:, None], known))
-        x = np.linalg.lstsq(matrix, np.concatenate((seen * weight, known @ [0, 0, 0, 0, 0, -GRAVITY])), rcond=None)[0]
+        matrix = np.vstack((rows * weight[:, None], prior))
+        x = np.linalg.lstsq(matrix, np.concatenate((seen * weight, prior @ [0, 0, 0, 0, 0, -GRAVITY])), rcond=None)[0]
         weight = 1.0 / np.sqrt(1.0 + ((seen - rows @ x) / (3.0 * noise)) ** 2)
     return np.asarray(x), np.asarray(noise**2 * np.linalg.inv(matrix.T @ matrix))
 
@@ -94,8 +94,8 @@ def _share(
         if count >= 4:
             kept = np.delete(kept, np.argmax(np.abs(left[:count]) / np.sqrt(np.diag(spread))))
         weighed = np.linalg.solve(spread[np.ix_(kept, kept)], np.column_stack((pattern[kept], left[kept])))
-        known = float(pattern[kept] @ weighed[:, 0])
-        if known > 1.0 / ERROR**2:
-            share, misfit = float(pattern[kept] @ weighed[:, 1]) / known, float(left[kept] @ weighed[:, 1]) / len(kept)
-            return Share(float(away[count - 1]), share, known**-0.5, misfit)
+        fisher = float(pattern[kept] @ weighed[:, 0])
+        if fisher > 1.0 / ERROR**2:
+            share, misfit = float(pattern[kept] @ weighed[:, 1]) / fisher, float(left[kept] @ weighed[:, 1]) / len(kept)
+            return Share(float(away[count - 1]), share, fisher**-0.5, misfit)
     return None

@@ -39,12 +39,12 @@ class Measured:
     def findings(self) -> Iterator[Finding]:
         """Yield one observation for each fit: what it leaves beyond the noise."""
         unit = "rad/s" if self.film.quantity == "omega" else "degrees"
-        for one in self.fits:
-            solver = one.estimate.solver
-            names = [name for name in ("gamma", "restitution", "omega0", "release") if name in one.estimate.draws]
-            note = ", ".join(f"{name} = {one.number(name)}" for name in names)
+        for fit in self.fits:
+            solver = fit.estimate.solver
+            names = [name for name in ("gamma", "restitution", "omega0", "release") if name in fit.estimate.draws]
+            note = ", ".join(f"{name} = {fit.number(name)}" for name in names)
             title = f"{HELD[solver]} fitted to {self.film.label}"
-            yield observed(f"measured-fit-{solver}", title, one.discrepancy, unit, note)
+            yield observed(f"measured-fit-{solver}", title, fit.discrepancy, unit, note)
 
     def exhibit(self) -> Exhibit:
         """Return the figure: the measurement under the fitted solvers, and what is left of it."""
@@ -52,9 +52,9 @@ class Measured:
         omega = self.film.quantity == "omega"
         unit = "rad/s" if omega else "rad"
         columns = {"t [s]": t, f"measured [{unit}]": self.film.values[0, :, 0] if omega else best.theta}
-        for one in self.fits:
-            fitted = np.where(one.estimate.flying, one.fitted[int(omega)], np.nan)
-            columns[f"{HELD[one.estimate.solver]} fitted [{unit}]"] = fitted
+        for fit in self.fits:
+            fitted = np.where(fit.estimate.flying, fit.fitted[int(omega)], np.nan)
+            columns[f"{HELD[fit.estimate.solver]} fitted [{unit}]"] = fitted
         return Exhibit(
             name="measured",
             title="Your measurement and the solvers",
@@ -85,15 +85,15 @@ def part_measured(film: Film) -> Part:
     def study(ask: Ask) -> Study[Measured]:
         call = Call(hold, (film, ask.scenario), "fits of the measurement")
         flights = yield (call,)
-        found: Measured = flights.answer(call)
-        return found
+        measured: Measured = flights.answer(call)
+        return measured
 
     chapter = Chapter(
         name="measured",
         title="Your measurement",
         study=study,
         claims=Measured.findings,
-        figures=lambda found: (found.exhibit(),),
+        figures=lambda measured: (measured.exhibit(),),
         template=Path(__file__).with_name("measured.html.j2"),
     )
     sentence = "The flight that was measured, and the solvers fitted to it: which equation is nearest."

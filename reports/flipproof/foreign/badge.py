@@ -19,9 +19,9 @@ def badge(certificate: Certificate) -> str:
     """Return the drawing as SVG; its title is the conclusion, with the whole domain."""
     weak = sum(result.verdict == WEAK for result in certificate.results)
     verdict = f"{len(certificate.failed)} failed" if certificate.failed else f"{weak} weak" if weak else "passed"
-    asked = {name: certificate.domain[name] for name in ("slices", "restitution") if name in certificate.domain}
+    domain = {name: certificate.domain[name] for name in ("slices", "restitution") if name in certificate.domain}
     words = f"{certificate.traits.equation or 'no equation'}: {verdict}"
-    words += f" ({domain_text(asked)})" if asked else ""
+    words += f" ({domain_text(domain)})" if domain else ""
     colour = "#a62b1f" if certificate.failed else "#8a6100" if weak else "#2b7a2b"
     length = round(6.6 * len(words))
     title = escape(f"{certificate.traits.name}: {certificate.conclusion}")

@@ -94,8 +94,8 @@ def drive(making: Generator[Sequence[Ask], Sequence[Answer], Result], runner: Ca
                 continue
             asks = making.send(answers)
     except StopIteration as end:
-        found: Result = end.value
-        return found
+        result: Result = end.value
+        return result
 
 
 def _answers(asks: Sequence[Ask], runner: Callable[[Ask], Answer]) -> list[Answer]:

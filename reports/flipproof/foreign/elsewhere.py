@@ -205,7 +205,7 @@ def designed(rng: np.random.Generator) -> list[list[int]]:
             ({(i, j, row[i], row[j]) for i, j in combinations(range(len(sizes)), 2)} - met, row)
             for row in rng.integers(0, sizes, (100, len(sizes))).tolist()
         ]
-        new, row = max(some, key=lambda one: len(one[0]))
+        new, row = max(some, key=lambda candidate: len(candidate[0]))
         met |= new
         rows.append(row)
     return rows
@@ -217,10 +217,10 @@ def drawn(seed: int) -> tuple[Knobs, ...]:
     rng = np.random.default_rng(seed)
     throws = []
     turns = {
-        each: cycle(rng.permutation(each).tolist())
+        level: cycle(rng.permutation(level).tolist())
         for levels in FACTORS.values()
-        for each in levels
-        if isinstance(each, tuple)
+        for level in levels
+        if isinstance(level, tuple)
     }
     for row in designed(rng):
         of = {name: levels[level] for (name, levels), level in zip(FACTORS.items(), row, strict=True)}
@@ -350,8 +350,8 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
     scale = scales(ask, truth)
     reached = min(len(run.t) for run in (truth, *twins))
 
-    def sizes(one: Any, other: Any, name: str) -> FloatArray:
-        difference = np.abs(getattr(one, name)[:reached] - getattr(other, name)[:reached]) / scale[name]
+    def sizes(flight: Any, other: Any, name: str) -> FloatArray:
+        difference = np.abs(getattr(flight, name)[:reached] - getattr(other, name)[:reached]) / scale[name]
         return np.asarray(difference)
 
     def grown(values: FloatArray) -> FloatArray:
@@ -364,7 +364,7 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
     owns: dict[str, FloatArray] = {}
     for name in given:
         summed = grown if name != "v" else lambda x: np.full(reached, np.quantile(x, 1 - STRAY))
-        own = np.max([np.zeros(reached), *(summed(sizes(mine, one, name)) for one in answers[1:])], axis=0)
+        own = np.max([np.zeros(reached), *(summed(sizes(mine, coarser, name)) for coarser in answers[1:])], axis=0)
         owns[name] = own if len(answers) > 1 else np.full(reached, unrefined)
         rooms[name] = floor + OWN * owns[name] + BAND * sum(summed(sizes(truth, twin, name)) for twin in twins)
     clear = rooms["omega"] <= BLURRED
@@ -393,13 +393,13 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         room_of_r = rooms.get("r", rooms["omega"])[clear]
         if late := _unmatched(ask, mine.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]):
             wrong["impacts"] = late
-    passed, since = _since(ask, truth.impacts or NO_IMPACTS, first) if wrong else (0, "")
+    passed, onset = _since(ask, truth.impacts or NO_IMPACTS, first) if wrong else (0, "")
     return Judged(
         wrong=wrong,
         own=float(np.max(owns["omega"][clear])) if clear.any() else float(owns["omega"].min()),
         largest=float(np.max(sizes(mine, truth, "omega")[clear], initial=0.0)),
         share=float(np.mean(clear)) * reached / len(ask.times),
-        since=since,
+        since=onset,
         passed=passed,
         alone=alone,
         astray=astray,
@@ -440,7 +440,7 @@ def _unmatched(
     Impacts of one slice on one end are matched by time and number, up to the last of ``times``; a slice that is
     ``room_of_r`` off is late by as much over its speed. Fractions of the flight; None if every impact has its match.
     """
-    throw, found = ask.scenario, []
+    throw, misses = ask.scenario, []
     faint = FAINT * throw.bottle.length * abs(throw.omega0)
     for one, other in ((mine, truth), (truth, mine)):
         for k in np.flatnonzero(one.speed_before > faint):
@@ -457,8 +457,8 @@ def _unmatched(
             count = int(np.sum(near <= room))
             off = float(others[count - 1]) if count <= len(others) else 1.0
             if off > 2 * room and when + 2 * room * throw.duration < times[-1]:
-                found.append((off, 2 * room, float(when)))
-    return max(found, key=lambda one: one[0] / one[1], default=None)
+                misses.append((off, 2 * room, float(when)))
+    return max(misses, key=lambda one: one[0] / one[1], default=None)
 
 
 Judging = Generator[Sequence[Ask], Sequence[Answer], list[Judged]]
@@ -488,10 +488,11 @@ def judging(
             for k in left
         }
         with suppress(ForeignError):
-            yield [ask for each in refined.values() for ask in each]  # all at once, where somebody writes the answers
-        for k, each in refined.items():
+            # All at once, where somebody writes the answers.
+            yield [ask for series in refined.values() for ask in series]
+        for k, series in refined.items():
             try:
-                judged[k] = judge(traits, asks[k], (yield each), equation, 0.0 if throws[k].frozen else unrefined)
+                judged[k] = judge(traits, asks[k], (yield series), equation, 0.0 if throws[k].frozen else unrefined)
             except ForeignError as error:
                 judged[k] = Judged(wrong={"answer": (1.0, 1e-3, 0.0)}, error=str(error))
         # What fails at long steps need not fail at short ones.
@@ -517,11 +518,11 @@ def confirmed(
 
 def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
     """Other bottles, fillings, slices, starts, spins and times: every field is that of the equation."""
-    found = yield from placing(traits)
-    equation = traits.equation or found.equation
-    if not found.on_lattice or found.equation != name_of(switches_of(equation)):
+    place = yield from placing(traits)
+    equation = traits.equation or place.equation
+    if not place.on_lattice or place.equation != name_of(switches_of(equation)):
         raise NotApplicableError("needs an equation that the solver is found to solve")
-    unrefined = min(0.01 + 4 * found.distance, 0.018)  # as far off as where it was placed, and not blurred
+    unrefined = min(0.01 + 4 * place.distance, 0.018)  # as far off as where it was placed, and not blurred
     throws = drawn(seed)
     flights = list(zip(throws, (yield from judging(traits, throws, seed, equation, unrefined)), strict=True))
     # Where a solver of low order errs less than elsewhere by luck, it owes no more than elsewhere.
@@ -529,8 +530,8 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
         float(np.median([judged.own for knobs, judged in flights if not knobs.frozen])) if traits.refined_by else 0.0
     )
     wrong = [(knobs, judged) for knobs, judged in flights if judged.farthest > (0.0 if knobs.frozen else usual)]
-    wrong = [one for one in wrong if not one[0].frozen] or wrong
-    wrong.sort(key=lambda one: -one[1].excess)
+    wrong = [flight for flight in wrong if not flight[0].frozen] or wrong
+    wrong.sort(key=lambda flight: -flight[1].excess)
     while wrong:
         finest = yield from confirmed(traits, *wrong[0], seed, equation, unrefined)
         if finest.wrong:
@@ -577,7 +578,7 @@ def bisected(
         without = "" if knobs.frozen or fields else (yield from simplified(traits, equation, unrefined))
         return f"{ice}{_wrong_words(base)} on the paper's throw, too", f"{without}{fields}"
     single = [_shortened(replace(paper, **{name: getattr(knobs, name)}), seed, FEW_IMPACTS) for name in names]
-    turned = sorted(zip(names, single, (yield from how(single)), strict=True), key=lambda one: -one[2].excess)
+    turned = sorted(zip(names, single, (yield from how(single)), strict=True), key=lambda trial: -trial[2].excess)
     for name, throw, first in turned:
         alone = (yield from confirmed(traits, throw, first, seed, equation, unrefined)) if first.wrong else first
         if alone.wrong:
@@ -588,12 +589,12 @@ def bisected(
     backs = yield from how([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
     again = [name for name, back in zip(names, backs, strict=True) if not back.wrong and back.share > 0.3]
     if 0 < len(again) <= 4:
-        here, there = (
+        paper_words, throw_words = (
             " or ".join(said(PAPER, name) for name in again),
             " and ".join(said(knobs, name) for name in again),
         )
         return (
-            f"{ice}right at {here}, wrong at {there} where other things are changed, too: {lost}",
+            f"{ice}right at {paper_words}, wrong at {throw_words} where other things are changed, too: {lost}",
             f"{together or _impact_advice(judged)}{'; or '.join(WORDS[name][1] for name in again)}"
             f"{_field_advice(judged, '; ', ice=knobs.frozen)}",
         )
@@ -649,20 +650,20 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
     }
     others = yield from judging(traits, list(simpler.values()), 0, equation, unrefined)
     right = {name for name, judged in zip(simpler, others, strict=True) if not judged.wrong}
-    since = f"with all of it first wrong {first.since}{first.alone}; "
+    onset = f"with all of it first wrong {first.since}{first.alone}; "
     if {"weight", "impacts"} <= right:
         if "rests" in right:
-            return f"right without weight, and without rests: look at {LOOK_AT['rests']}; {since}"
+            return f"right without weight, and without rests: look at {LOOK_AT['rests']}; {onset}"
         if first.passed:
-            return f"right without weight, and through some impacts: look at rests and at {LOOK_AT['impacts']}; {since}"
-        return f"right without weight, and before half a turn: look at {LOOK_AT['weight']}, at every angle; {since}"
+            return f"right without weight, and through some impacts: look at rests and at {LOOK_AT['impacts']}; {onset}"
+        return f"right without weight, and before half a turn: look at {LOOK_AT['weight']}, at every angle; {onset}"
     if {"rests", "impacts"} <= right:
-        return f"right through impacts as long as no slice rests: look at {LOOK_AT['rests']}; {since}"
+        return f"right through impacts as long as no slice rests: look at {LOOK_AT['rests']}; {onset}"
     for name in ("weight", "drag", "impacts"):
         if name in right:
-            return f"{right_without(name)}{since}"
+            return f"{right_without(name)}{onset}"
     if "all" in right:
-        return f"right without weight, drag and impacts together, but wrong if only one of them is removed; {since}"
+        return f"right without weight, drag and impacts together, but wrong if only one of them is removed; {onset}"
     too = "wrong before the first impact without weight and drag, too"
     (apart,) = yield from judging(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
     if not apart.wrong:
@@ -684,8 +685,8 @@ def _wrong_words(judged: Judged) -> str:
     unit = {**units, "impacts": "the flight"}.get(worst[0], "L")
     also = f", and {', '.join(worst[1:])}" if len(worst) > 1 else ""
     is_off = f"{'are' if worst[0] == 'impacts' else 'is'} {off:.2g} of {unit} off (room {room:.1g})"
-    since = f", first {judged.since}{judged.alone}" if judged.since else ""
-    return f"{worst[0]} {is_off} at t = {time:.3g} s{also}{since}"
+    onset = f", first {judged.since}{judged.alone}" if judged.since else ""
+    return f"{worst[0]} {is_off} at t = {time:.3g} s{also}{onset}"
 
 
 TOGETHER: Final = "slices strike both ends at one instant there: each keeps its own speed times -e, none is left out; "

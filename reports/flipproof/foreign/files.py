@@ -97,8 +97,8 @@ def answer_in(path: Path, ask: Ask, name: str, *, own_times: bool = False) -> An
     try:
         return answer_of(ask, read_answer(path, ask.scenario.n_slices), own_times=own_times)
     except AnswerError as error:
-        said = str(error).replace(str(path), name)
-        raise ForeignError(said if name in said else f"{name}: {said}") from None
+        message = str(error).replace(str(path), name)
+        raise ForeignError(message if name in message else f"{name}: {message}") from None
 
 
 class File(Runner):
@@ -133,10 +133,10 @@ def traits_of_command(spec: str, timeout: float | None, given: Mapping[str, Any]
             raise ValueError(f"{unknown} (write {{{{{name}}}}} if it is the program's own)")
     effort = any("{effort}" in word for word in words)
     name = next((Path(w).name for w in words[1:] if not w.startswith(("-", "{"))), Path(words[0]).name)
-    said = {"name": name, "refined_by": "dt" if effort else None, "timeout": timeout or 60.0, **given}
-    if said["refined_by"] and not effort:
-        raise ValueError(f"solver {spec!r}: refined_by = {said['refined_by']!r} needs {{effort}} in the command")
-    return Traits(**said)
+    fields = {"name": name, "refined_by": "dt" if effort else None, "timeout": timeout or 60.0, **given}
+    if fields["refined_by"] and not effort:
+        raise ValueError(f"solver {spec!r}: refined_by = {fields['refined_by']!r} needs {{effort}} in the command")
+    return Traits(**fields)
 
 
 def run_command(spec: str, folder: str, ask: Ask) -> Answer:
@@ -182,8 +182,8 @@ class Folder(Runner):
         if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not index.is_file())):
             raise ValueError(f"{folder} holds something else than questions; name a new folder")
         try:
-            said = json.loads(index.read_text(encoding="utf-8")) if index.is_file() else {"name": folder.name}
-            self.traits = Traits(**{**said, **given})
+            fields = json.loads(index.read_text(encoding="utf-8")) if index.is_file() else {"name": folder.name}
+            self.traits = Traits(**{**fields, **given})
         except (OSError, ValueError, TypeError, RecursionError) as error:
             raise ValueError(f"{index}: is not readable ({error})") from None
         if given or not index.is_file():

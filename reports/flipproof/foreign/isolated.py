@@ -120,7 +120,7 @@ class Isolated(Runner):
         assert process.stdin is not None
         frame = io.BytesIO()
         send(frame, header, arrays)
-        asked, answer, deadline = memoryview(frame.getvalue()), bytearray(), time.monotonic() + limit
+        unsent, answer, deadline = memoryview(frame.getvalue()), bytearray(), time.monotonic() + limit
         try:
             with selectors.DefaultSelector() as ready:
                 ready.register(process.stdin, selectors.EVENT_WRITE)
@@ -138,8 +138,8 @@ class Isolated(Runner):
                         raise BrokenFrameError("the stream ended")  # what it left behind may hold its pipes open
                     for key, _ in events:
                         if key.fileobj is process.stdin:
-                            asked = asked[os.write(key.fd, asked) :] if not dead else asked[:0]
-                            if not asked:
+                            unsent = unsent[os.write(key.fd, unsent) :] if not dead else unsent[:0]
+                            if not unsent:
                                 ready.unregister(process.stdin)
                             continue
                         part = os.read(key.fd, 1 << 20)
@@ -167,8 +167,8 @@ class Isolated(Runner):
         with contextlib.suppress(OSError, ValueError):
             while part := os.read(self._process.stderr.fileno(), 65536):  # type: ignore[union-attr]
                 self._printed = (self._printed + part)[-KEPT:]
-        said = last_line(self._printed)
-        return f"the process {ending(status)} before it answered{f'; last line printed: {said}' if said else ''}"
+        printed = last_line(self._printed)
+        return f"the process {ending(status)} before it answered{f'; last line printed: {printed}' if printed else ''}"
 
 
 def refuse_built_in(name: str) -> None:
@@ -188,15 +188,15 @@ def serve() -> None:
     os.dup2(empty, 0)
     os.dup2(2, 1)
     sys.dont_write_bytecode = True  # a copy of a file that is edited in the same second would be taken for it
-    asked, _ = receive(inbox, 0)
-    spec = asked["spec"]
+    request, _ = receive(inbox, 0)
+    spec = request["spec"]
     try:
-        solver = functools.partial(run_command, spec, asked["scratch"]) if written(spec)[0] == COMMAND else load(spec)
+        solver = functools.partial(run_command, spec, request["scratch"]) if written(spec)[0] == COMMAND else load(spec)
         traits = contract.traits_of(solver, spec)
         solve = contract.solve_of(solver)
-        said = {name: getattr(traits, name) for name in traits.__slots__}
-        said["distribution"] = traits.distribution or distribution_of(spec)
-        send(outbox, {"traits": said}, {})
+        fields = {name: getattr(traits, name) for name in traits.__slots__}
+        fields["distribution"] = traits.distribution or distribution_of(spec)
+        send(outbox, {"traits": fields}, {})
     except BaseException as error:
         send(outbox, {"reason": _reason(error)}, {})
         return

@@ -147,8 +147,8 @@ def switches_of(equation: str) -> Switches:
 
 def curve(equation: str, scenario: Scenario, times: FloatArray) -> Answer:
     """Return theta(t) and omega(t) of an equation of the ladder, by the reference."""
-    found = solve(switches_of(equation).name, scenario, times=times)
-    return Answer(t=found.t, theta=found.theta, omega=found.omega)
+    trajectory = solve(switches_of(equation).name, scenario, times=times)
+    return Answer(t=trajectory.t, theta=trajectory.theta, omega=trajectory.omega)
 
 
 @cache
@@ -188,9 +188,10 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
     nearest = min(distances, key=lambda s: (distances[s], s.name))
     following = min((s for s in distances if s != nearest), key=lambda s: (distances[s], s.name))
     moved = max(float(np.max(np.abs(c - 1.0))) for c in curves)
-    rooms = [_room(each, distances[following], traits.epsilon) for each in changes]
+    rooms = [_room(own_change, distances[following], traits.epsilon) for own_change in changes]
     distance, change, room = max(
-        zip(_apart(curves, references[nearest]), changes, rooms, strict=True), key=lambda found: found[0] / found[2]
+        zip(_apart(curves, references[nearest]), changes, rooms, strict=True),
+        key=lambda of_throw: of_throw[0] / of_throw[2],
     )
     return Place(
         solver=traits.name,
@@ -211,9 +212,9 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
     )
 
 
-def _apart(one: tuple[FloatArray, ...], other: tuple[FloatArray, ...]) -> list[float]:
+def _apart(curves: tuple[FloatArray, ...], others: tuple[FloatArray, ...]) -> list[float]:
     """Return the largest difference of two solvers on each throw."""
-    return [float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True)]
+    return [float(np.max(np.abs(a - b))) for a, b in zip(curves, others, strict=True)]
 
 
 def _room(change: float | None, following: float, epsilon: float) -> float:
@@ -249,11 +250,11 @@ class Explanation:
     @property
     def text(self) -> str:
         """The explanation, a line each."""
-        one, other = self.first, self.second
+        first, second = self.first, self.second
         lines = [
-            one.text,
-            other.text,
-            f"mean of omega/omega_0 over the second half: {one.solver} {self.values[0]:.6f}, {other.solver} "
+            first.text,
+            second.text,
+            f"mean of omega/omega_0 over the second half: {first.solver} {self.values[0]:.6f}, {second.solver} "
             f"{self.values[1]:.6f}, difference {self.difference:+.6f}",
         ]
         for name, share in self.bars.items():

@@ -86,8 +86,8 @@ def start(words: list[str], memory: float, **pipes: Any) -> subprocess.Popen[byt
 def ending(status: int) -> str:
     """Return how a program ended, in words; a shell says 128 and the signal where one ended it."""
     number = -status if status < 0 else status - 128
-    known = [each.name for each in signal.Signals if each == number]
-    return f"was ended by {known[0]}" if known else f"ended with status {status}"
+    names = [member.name for member in signal.Signals if member == number]
+    return f"was ended by {names[0]}" if names else f"ended with status {status}"
 
 
 def end(process: subprocess.Popen[bytes]) -> None:

@@ -151,14 +151,14 @@ class Own(Runner):
             if self.solver.package == "engine_check" and ask.effort is not None:
                 settings["dt"] = ask.effort
         try:
-            found = solvers.solve(self.solver.name, started(ask), **settings)
-            if not found.ok:
-                raise ForeignError(f"status = {found.status!r}: {found.message}")
+            trajectory = solvers.solve(self.solver.name, started(ask), **settings)
+            if not trajectory.ok:
+                raise ForeignError(f"status = {trajectory.status!r}: {trajectory.message}")
             if grid is None:
-                return answer_of(ask, found)
+                return answer_of(ask, trajectory)
             names = ("theta", "omega", "r", "v", "r_cm", "inertia")
-            values = {n: _between(grid, getattr(found, n), ask.times) for n in names}
-            return answer_of(ask, {"t": ask.times, **values, "impacts": found.impacts})
+            values = {n: _between(grid, getattr(trajectory, n), ask.times) for n in names}
+            return answer_of(ask, {"t": ask.times, **values, "impacts": trajectory.impacts})
         except ForeignError:
             raise
         except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:

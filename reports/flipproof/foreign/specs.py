@@ -118,8 +118,8 @@ def words_of(spec: str) -> list[str]:
 
 def load(spec: str) -> object:
     """Import what a spec names and return it. This runs foreign code: call it in a process that may be lost."""
-    found = locate(spec)
-    solver = found.load() if isinstance(found, EntryPoint) else getattr(_module(found[0]), found[1])
+    target = locate(spec)
+    solver = target.load() if isinstance(target, EntryPoint) else getattr(_module(target[0]), target[1])
     return solver() if isinstance(solver, type) else solver
 
 
@@ -148,14 +148,14 @@ def content_of(spec: str) -> str:
     """Return the SHA-256 of the files that a spec stands for, empty for flipproof's own; nothing is imported."""
     if not is_foreign(spec):
         return ""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     try:
         for name, file in sorted(files_of(spec)):
-            found.update(f"{name}\0".encode())
-            found.update(hashlib.sha256(file.read_bytes()).digest())
+            digest.update(f"{name}\0".encode())
+            digest.update(hashlib.sha256(file.read_bytes()).digest())
     except OSError as error:
         raise ValueError(f"solver {spec!r}: {error.filename} cannot be read ({error.strerror or error})") from None
-    return found.hexdigest()
+    return digest.hexdigest()
 
 
 def files_of(spec: str) -> Iterator[tuple[str, Path]]:
@@ -172,8 +172,8 @@ def files_of(spec: str) -> Iterator[tuple[str, Path]]:
             if os.path.isfile(file):  # which takes a word that is too long for a name, too
                 yield str(k), Path(file)
         return
-    found = locate(spec)
-    place = found.module if isinstance(found, EntryPoint) else found[0]
+    target = locate(spec)
+    place = target.module if isinstance(target, EntryPoint) else target[0]
     if place.endswith(".py"):
         yield Path(place).name, Path(place)
     else:

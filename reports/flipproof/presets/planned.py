@@ -145,8 +145,8 @@ def map_csv(study: ValidityMap) -> str:
         "largest fair share": np.array([*RUNGS, ""])[study.dominant],  # -1 where there is none
         "reason": study.reason,
     }
-    known = [np.where(np.isfinite(c), c, np.nan) if c.dtype.kind == "f" else c for c in columns.values()]
-    return rows_csv(list(columns), zip(*(cells.flat for cells in known), strict=True), digits=None)
+    finite = [np.where(np.isfinite(c), c, np.nan) if c.dtype.kind == "f" else c for c in columns.values()]
+    return rows_csv(list(columns), zip(*(cells.flat for cells in finite), strict=True), digits=None)
 
 
 def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:

@@ -50,7 +50,7 @@ def make_upright(
         If the folder, the workers or the disk will not do; what was stored is kept.
     """
     own_folder(out, "landing")
-    told = []
+    summaries = []
 
     def make(wave: str, cases: Cases) -> Rows:
         design = Throws(cases=tuple(cases.values()), seed=size.seed)
@@ -60,7 +60,7 @@ def make_upright(
             store,
             summary,
         ):
-            told.append(summary)
+            summaries.append(summary)
             return design.by_case([Landed(**row) for row in rows_of(store, design.points()) if row is not None])
 
     aims, unaimed = aiming(throw, size)
@@ -74,4 +74,4 @@ def make_upright(
         write_whole(out / f"{exhibit.name}.svg", drawing.svg.encode())
         write_whole(out / f"{exhibit.name}.png", drawing.png)
     lines = [share_line(results, family) for family in size.families]
-    return "\n".join([*lines, f"({results.assumed})", *told, f"Tables and figures: {out}"])
+    return "\n".join([*lines, f"({results.assumed})", *summaries, f"Tables and figures: {out}"])

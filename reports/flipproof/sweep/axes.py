@@ -91,7 +91,7 @@ def read_axes(table: Mapping[str, Any], where: str, *, grid: bool) -> tuple[Axis
     entries: dict[str, Any] = {}
     for name, given in table.items():
         # TOML reads bottle.length without quotes as a table in a table.
-        inner = isinstance(given, Mapping) and any(known.startswith(f"{name}.") for known in KINDS)
+        inner = isinstance(given, Mapping) and any(kind.startswith(f"{name}.") for kind in KINDS)
         entries |= {f"{name}.{key}": value for key, value in given.items()} if inner else {name: given}
     if not entries:
         raise SweepError(f"{where} is empty; name at least one field, such as fill_fraction = [0.25, 0.5]")
@@ -109,11 +109,11 @@ def _axis(name: str, given: object, where: str, grid: bool) -> Axis:
     if not isinstance(given, Mapping) or kind == "truth":
         example = "[false, true]" if kind == "truth" else "[...] or {from = ..., to = ..., count = ...}"
         raise SweepError(f"{where} = {shortened(repr(given), 60)} is not a list of values; write {example}")
-    known = ("from", "to", "count", "scale") if grid else ("from", "to", "scale")
+    keys = ("from", "to", "count", "scale") if grid else ("from", "to", "scale")
     if "count" in given and not grid:
         raise SweepError(f"{where}: count belongs to a grid; in a Latin hypercube [sweep] samples counts them all")
-    refuse_unknown(f"{where} key", given, known)
-    missing = [key for key in known[:-1] if key not in given]
+    refuse_unknown(f"{where} key", given, keys)
+    missing = [key for key in keys[:-1] if key not in given]
     if missing:
         raise SweepError(f"{where} lacks {' and '.join(missing)}")
     low, high = (_value(given[key], kind, f"{where} {key}") for key in ("from", "to"))

@@ -77,7 +77,7 @@ def completed(
         with processes(jobs) if executor is None else executor_of(executor) as workers:
             in_flight = 2 * (jobs or cores()) if executor is None else IN_FLIGHT
             with _plainly(out):
-                counts, made = fill(store, points(), workers, in_flight, progress)
+                counts, new_count = fill(store, points(), workers, in_flight, progress)
         if export_to:
             with _plainly(out):
                 export(store, points(), swept and swept(), export_to)
@@ -88,9 +88,9 @@ def completed(
             )
         seconds = time.perf_counter() - began
         kinds = ", ".join(f"{counts[status]} {status}" for status in OUTCOMES if status in counts)
-        rate = f"; {made} made in {seconds:.1f} s ({made / seconds:.0f} per second)" if made else ""
-        known = f"; {size - made} were there" if made < size else ""
-        yield store, f"{size} points in {store.path}: {kinds}{rate}{known}"
+        rate = f"; {new_count} made in {seconds:.1f} s ({new_count / seconds:.0f} per second)" if new_count else ""
+        stored = f"; {size - new_count} were there" if new_count < size else ""
+        yield store, f"{size} points in {store.path}: {kinds}{rate}{stored}"
 
 
 @contextmanager
@@ -129,7 +129,9 @@ def _say_what_differs(store: Store, say: Callable[[str], object]) -> None:
         say(f"{store.path} holds rows by flipproof {', '.join(codes)} too; this is {code} and takes none of them")
     there = [facts.get("versions", {}) for facts in store.shared() if facts.get("code") == code]
     for name, version in own.items():
-        others = sorted({str(each[name]) for each in there if each.get(name, version) != version})
+        others = sorted(
+            {str(row_versions[name]) for row_versions in there if row_versions.get(name, version) != version}
+        )
         if others:
             say(f"{store.path} holds rows made under {name} {', '.join(others)}; this is {version}, and they are kept")
 

@@ -55,9 +55,9 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
     except ValueError as error:
         raise SweepError(f"{where}: {error}") from None
     where = f"{where} ({name})"
-    known, open_ended = _settings_of(solver)
+    settings, open_ended = _settings_of(solver)
     if not open_ended:
-        refuse_unknown(f"{where} key", table, known)
+        refuse_unknown(f"{where} key", table, settings)
     for key, value in table.items():
         if not _plain(value):
             raise SweepError(f"{where} {key} = {value!r} is not a finite number, a word, true, false or a list of them")

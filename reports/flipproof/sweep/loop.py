@@ -84,7 +84,7 @@ def fill(
         future = done.get()
         chunk = flying.pop(future)
         try:
-            made, lost = future.result(), 0
+            result, lost = future.result(), 0
         except NoWorkersError as error:
             raise _no_workers(error) from None
         except Exception as error:  # the worker, or the way to it, is gone: points themselves raise nothing
@@ -101,15 +101,15 @@ def fill(
                 again.append(chunk)
                 continue
             words = f"the worker died twice with this point alone in it ({error})"
-            made = Made(code, versions(), [{"status": "worker-died", "reason": words}])
-        if made.changed:
-            words = f"the files of {made.changed} are not those that the sweep was begun with; begin it again"
+            result = Made(code, versions(), [{"status": "worker-died", "reason": words}])
+        if result.changed:
+            words = f"the files of {result.changed} are not those that the sweep was begun with; begin it again"
             raise SweepError(f"{words}, which keeps the rows that are there")
-        if made.code != code:
-            raise SweepError(f"a worker runs flipproof {made.code}, this is {code}; install the same in both")
-        store.put(_entries(chunk, made, base))
-        made_now += len(made.rows)
-        count(made.rows)
+        if result.code != code:
+            raise SweepError(f"a worker runs flipproof {result.code}, this is {code}; install the same in both")
+        store.put(_entries(chunk, result, base))
+        made_now += len(result.rows)
+        count(result.rows)
 
 
 def rows_of(store: Store, points: Iterable[Point]) -> Iterator[Row | None]:
@@ -124,23 +124,23 @@ def _row(shared: Any, answer: bytes) -> Row:
     return dict(zip(shared["columns"], json.loads(answer), strict=True))
 
 
-def _entries(chunk: Chunk, made: Made, base: Throw) -> list[Entry]:
+def _entries(chunk: Chunk, result: Made, base: Throw) -> list[Entry]:
     """Return the rows of a chunk as entries: what differs from the base throw stands beside each."""
-    point = chunk[0][1]
+    first = chunk[0][1]
     facts = {
-        "solver": point.solver,
-        "settings": dict(point.settings),
-        "maker": point.maker,
-        "options": dict(point.options),
-        "code": made.code,
-        "content": point.content,
-        "versions": dict(made.versions),
+        "solver": first.solver,
+        "settings": dict(first.settings),
+        "maker": first.maker,
+        "options": dict(first.options),
+        "code": result.code,
+        "content": first.content,
+        "versions": dict(result.versions),
         "throw": base,
-        "columns": list(made.rows[0]),
+        "columns": list(result.rows[0]),
     }
     return [
-        Entry(key, facts, json_of(_changes(each.throw, base)), json_of(list(row.values())))
-        for (key, each), row in zip(chunk, made.rows, strict=True)
+        Entry(key, facts, json_of(_changes(point.throw, base)), json_of(list(row.values())))
+        for (key, point), row in zip(chunk, result.rows, strict=True)
     ]
 
 
@@ -162,7 +162,7 @@ def _missing(
         there = store.get([key for key, *_ in some])
         if there:
             count(_row(*there[key]) for key, *_ in some if key in there)
-        yield from (each for each in some if each[0] not in there)
+        yield from (keyed_point for keyed_point in some if keyed_point[0] not in there)
 
 
 def _chunks(keyed_points: Iterable[tuple[bytes, str, Point]]) -> Iterator[Chunk]:
@@ -195,18 +195,18 @@ def executor_of(spec: str) -> Iterator[Executor]:
     target, _, argument = spec.partition("@")
     module, _, name = target.partition(":")
     try:
-        made: Any = getattr(import_module(module), name)(*([argument] if argument else []))
+        product: Any = getattr(import_module(module), name)(*([argument] if argument else []))
     except Exception as error:  # whatever a factory of somebody else raises
         words = str(error) or type(error).__name__
         raise SweepError(f"--executor {spec}: {words}") from None
-    executor = made.get_executor(pure=False) if hasattr(made, "get_executor") else made
+    executor = product.get_executor(pure=False) if hasattr(product, "get_executor") else product
     if not hasattr(executor, "submit"):
-        raise SweepError(f"--executor {spec}: {type(made).__name__} is no concurrent.futures.Executor")
+        raise SweepError(f"--executor {spec}: {type(product).__name__} is no concurrent.futures.Executor")
     try:
         yield executor
     finally:
         with suppress(Exception):  # of a cluster that is gone
             executor.shutdown(wait=False, cancel_futures=True)
-        if made is not executor and hasattr(made, "close"):
+        if product is not executor and hasattr(product, "close"):
             with suppress(Exception):
-                made.close()
+                product.close()

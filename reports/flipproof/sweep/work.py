@@ -115,7 +115,7 @@ def keyed(points: Iterable[Point], code: str) -> Iterator[tuple[bytes, str, Poin
     last: tuple[Any, ...] = ()
     for point in points:
         solver, throw, *others = point
-        if not last or any(one is not other for one, other in zip(last, (solver, *others), strict=True)):
+        if not last or any(previous is not current for previous, current in zip(last, (solver, *others), strict=True)):
             last, kind = (solver, *others), kind_of(point)
             begun = hashlib.blake2b(f"{code}\n{kind}\n".encode(), digest_size=16)
         whole = begun.copy()
@@ -192,17 +192,17 @@ def _fly(
     solver: str, settings: Mapping[str, Any], throws: Sequence[Throw], slices: bool = False
 ) -> list[Trajectory | Row]:
     """Return the flight of every throw, with its ``slices`` if asked, or the row that says why there is none."""
-    asked = [scenario_of(throw) for throw in throws]
+    scenarios = [scenario_of(throw) for throw in throws]
     if not slices and _package(solver) == "ode_reference" and solver not in WATERS and settings.keys() <= SHARED:
         import ode_reference
 
         try:
-            possible = [throw for throw in asked if isinstance(throw, Scenario)]
+            possible = [throw for throw in scenarios if isinstance(throw, Scenario)]
             flights = iter(ode_reference.solve_batch(possible, solver, jobs=1, **settings).flights)
-            return [next(flights) if isinstance(throw, Scenario) else throw for throw in asked]
+            return [next(flights) if isinstance(throw, Scenario) else throw for throw in scenarios]
         except Exception:  # one of them cannot be solved: alone each says what is wrong with it
             pass
-    return [_alone(solver, settings, throw) if isinstance(throw, Scenario) else throw for throw in asked]
+    return [_alone(solver, settings, throw) if isinstance(throw, Scenario) else throw for throw in scenarios]
 
 
 def scenario_of(throw: Throw) -> Scenario | Row:

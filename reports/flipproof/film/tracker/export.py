@@ -100,14 +100,14 @@ def at_times(run: Trajectory, times: FloatArray) -> Trajectory:
 
 def until_landing(run: Trajectory, frames: Trajectory, height: float) -> tuple[Trajectory, str]:
     """Return the frames before the bottle comes down on a table, and how it does, in words; refuse if it does not."""
-    found = landing(run, height)
-    if found is None:
+    touchdown = landing(run, height)
+    if touchdown is None:
         raise ValueError(
             f"height = {height:g} m: the bottle does not come down on such a table within {run.t[-1]:g} s; choose a "
             "longer duration in the scenario, or another height"
         )
-    words = f"the {found.end} lands at t = {found.moment.time:.4f} s"
-    return at_times(frames, frames.t[frames.t <= found.moment.time]), words
+    words = f"the {touchdown.end} lands at t = {touchdown.moment.time:.4f} s"
+    return at_times(frames, frames.t[frames.t <= touchdown.moment.time]), words
 
 
 def data_track_text(

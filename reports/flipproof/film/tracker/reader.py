@@ -258,12 +258,12 @@ def _joined(tables: Sequence[TrackTable]) -> TrackTable:
     tracks: dict[str, Track] = {}
     for table, place in zip(tables, places, strict=True):
         for name, track in table.tracks.items():
-            known = name or Path(table.source).stem
-            if any(plain(known) == plain(other) for other in tracks):
-                raise TrackFileError(f"{source}: two files hold a track named {known!r}; rename one in Tracker")
+            label = name or Path(table.source).stem
+            if any(plain(label) == plain(other) for other in tracks):
+                raise TrackFileError(f"{source}: two files hold a track named {label!r}; rename one in Tracker")
             columns = {column: np.full(len(t), np.nan) for column in track.columns}
             for column, values in track.columns.items():
                 columns[column][place] = values
-            tracks[known] = Track(name=known, columns=columns, units=track.units)
+            tracks[label] = Track(name=label, columns=columns, units=track.units)
     dialects = tuple(dialect for table in tables for dialect in table.dialects)
     return TrackTable(source=source, dialects=dialects, t=t, resolution=resolution, tracks=tracks, lines=lines)

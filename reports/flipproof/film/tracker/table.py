@@ -83,9 +83,9 @@ class TrackTable:
 
         Spaces and underscores are the same, as Tracker's own copying makes them.
         """
-        found = [track for key, track in self.tracks.items() if plain(key) == plain(name)]
-        if len(found) == 1:
-            return found[0]
+        matches = [track for key, track in self.tracks.items() if plain(key) == plain(name)]
+        if len(matches) == 1:
+            return matches[0]
         if not any(self.tracks):
             raise TrackFileError(
                 f"{self.source}: holds one track without a name, not {name!r}; write the track's name in a line above "
@@ -197,7 +197,7 @@ def read_lines(path: Path) -> tuple[list[Line], str]:
     def last_line(text: str) -> Line:
         return Line(path, len(END.findall(text)) + 1, "")
 
-    mark, codec, encoding = next(found for found in MARKS if content.startswith(found[0]))
+    mark, codec, encoding = next(row for row in MARKS if content.startswith(row[0]))
     body = content[len(mark) :]
     try:
         text = body.decode(codec)
