@@ -41,7 +41,7 @@ def both(name: str, value: float) -> dict[str, float]:
 
 def extremes(name: str, values: Iterable[float]) -> dict[str, float]:
     """Return ``name.least`` and ``name.most``; nothing for no values, NaN if one is NaN."""
-    known = [float(value) for value in values]
-    if any(math.isnan(value) for value in known):
+    numbers = [float(value) for value in values]
+    if any(math.isnan(value) for value in numbers):
         return both(name, math.nan)
-    return {f"{name}.least": min(known), f"{name}.most": max(known)} if known else {}
+    return {f"{name}.least": min(numbers), f"{name}.most": max(numbers)} if numbers else {}

@@ -213,8 +213,8 @@ class Store(AbstractContextManager["Store"]):
             for *row, kind in old.execute(f"SELECT {columns} FROM made NOT INDEXED"):
                 if _whole(facts, *row):
                     key, shared, asked, answer, _ = row
-                    said = answer.decode() if kind == b"text" else answer
-                    some.append(Entry(key, json.loads(facts[shared]), asked.decode(), said))
+                    decoded = answer.decode() if kind == b"text" else answer
+                    some.append(Entry(key, json.loads(facts[shared]), asked.decode(), decoded))
         self.put(some)
         return len(some)
 

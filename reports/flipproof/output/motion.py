@@ -105,7 +105,9 @@ def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | N
     """
     times = np.linspace(0.0, throw.duration, FRAMES)
     there = {name: made[name] for name in FLOWN if name in made}
-    shown = {name: flight_of(each.trajectory, times) for name, each in there.items() if each.trajectory is not None}
+    shown = {
+        name: flight_of(result.trajectory, times) for name, result in there.items() if result.trajectory is not None
+    }
     if not shown:
         return None
     bottle = throw.bottle
@@ -124,7 +126,7 @@ def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | N
         "slow": 9.6,  # the paper's slow motion: 240 pictures per second shown at 25
         "position_step": POSITION_STEP,
         "flights": [_packed(name, flight, bottle.length) for name, flight in shown.items()],
-        "failed": [{"name": name, "reason": each.reason} for name, each in there.items() if name not in shown],
+        "failed": [{"name": name, "reason": result.reason} for name, result in there.items() if name not in shown],
         "table": _table(times, list(shown.values())),
     }
 

@@ -23,8 +23,8 @@ def trajectory_csv(trajectory: Trajectory) -> str:
 
     Slices count from 0. Numbers have 15 significant digits. What a solver did not give is left out.
     """
-    known = ("t", "theta", "omega", "r_cm", "inertia")
-    names = [name for name in known if name not in trajectory.diagnostics.get("not_given", ())]
+    quantities = ("t", "theta", "omega", "r_cm", "inertia")
+    names = [name for name in quantities if name not in trajectory.diagnostics.get("not_given", ())]
     columns = [getattr(trajectory, name) for name in names]
     if len(trajectory.r) == len(trajectory.t):
         slices = range(trajectory.scenario.n_slices)
@@ -89,18 +89,18 @@ def read_curve(path: Path) -> Curve:
 def _series(path: Path, names: list[str], rows: Rows, name: str) -> tuple[FloatArray, FloatArray]:
     """Return times and values of the rows in which both cells are filled."""
     places = names.index("t"), names.index(name)
-    found = np.array(
+    samples = np.array(
         [
             (number_of(path, line, "t", cells[places[0]]), number_of(path, line, name, cells[places[1]]), line)
             for line, cells in rows
             if all(cells[place].strip() for place in places)
         ]
     ).reshape(-1, 3)
-    back = np.flatnonzero(np.diff(found[:, 0]) < 0)
+    back = np.flatnonzero(np.diff(samples[:, 0]) < 0)
     if len(back):
-        before, after = found[back[0], 0], found[back[0] + 1, 0]
-        raise ValueError(f"{path}: line {found[back[0] + 1, 2]:.0f}: t = {after:g} s follows t = {before:g} s")
-    return found[:, 0], found[:, 1]
+        before, after = samples[back[0], 0], samples[back[0] + 1, 0]
+        raise ValueError(f"{path}: line {samples[back[0] + 1, 2]:.0f}: t = {after:g} s follows t = {before:g} s")
+    return samples[:, 0], samples[:, 1]
 
 
 @dataclass(frozen=True, slots=True)
