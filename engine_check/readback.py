@@ -19,11 +19,11 @@ def differences(meant: Mapping[str, float], held: Mapping[str, float], scales: M
     """
     problems = []
     for name, value in meant.items():
-        got = held.get(name, math.nan)
+        actual = held.get(name, math.nan)
         scale = max(abs(value), scales.get(name, 0.0))
-        if got == value or abs(got - value) <= ROUND_OFF * scale:
+        if actual == value or abs(actual - value) <= ROUND_OFF * scale:
             continue
-        problems.append(f"{name} = {got!r}, meant {value!r}")
+        problems.append(f"{name} = {actual!r}, meant {value!r}")
     return problems
 
 

@@ -245,12 +245,12 @@ class _Remembering(Executor):
             return answer
         answer.set_running_or_notify_cancel()
 
-        def keep(done: Future[Any]) -> None:
-            error = CancelledError() if done.cancelled() else done.exception()
+        def keep(future: Future[Any]) -> None:
+            error = CancelledError() if future.cancelled() else future.exception()
             if error is not None:
                 answer.set_exception(error)
             else:
-                value, content = done.result()
+                value, content = future.result()
                 answer.set_result(value)
                 self._store.keep_call(key, f"{fn.__module__}.{fn.__qualname__}", content)
 

@@ -68,8 +68,8 @@ def read_curve(path: Path) -> Curve:
     and column of what is missing, not a number, not finite, or goes back in time.
     """
     names, rows = read_cells(path)
-    there = [name for name in QUANTITIES if name in names]
-    if "t" not in names or not there:
+    quantities = [name for name in QUANTITIES if name in names]
+    if "t" not in names or not quantities:
         what = "t" if "t" not in names else f"of {', '.join(QUANTITIES)}"
         raise ValueError(f"{path}: the header has no column {what}; it has {shortened(', '.join(names), 80)}")
     notes: tuple[str, ...] = ()
@@ -77,12 +77,12 @@ def read_curve(path: Path) -> Curve:
     if flight := flight_in(path, names, rows):
         rows, release, notes = flight.rows, flight.release, (flight.words,)
     series: dict[str, tuple[FloatArray, FloatArray]] = {}
-    for name in there:
+    for name in quantities:
         t, values = _series(path, names, rows, name)
         if len(t) >= 2:
             series[name] = t - release, values
     if not series:
-        raise ValueError(f"{path}: has fewer than 2 rows with t and one of {', '.join(there)}")
+        raise ValueError(f"{path}: has fewer than 2 rows with t and one of {', '.join(quantities)}")
     return Curve(str(path), series, notes)
 
 

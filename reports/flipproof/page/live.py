@@ -107,6 +107,6 @@ def touch_data(touch: Touch) -> dict[str, Any]:
 
 def _text(values: FloatArray, low: float, high: float) -> str:
     parts = np.full(len(values), NONE, dtype="<u2")
-    there = np.isfinite(values)
-    parts[there] = np.rint((values[there] - low) / ((high - low) or 1.0) * (NONE - 1))
+    finite = np.isfinite(values)
+    parts[finite] = np.rint((values[finite] - low) / ((high - low) or 1.0) * (NONE - 1))
     return base64.b64encode(parts.tobytes()).decode("ascii")

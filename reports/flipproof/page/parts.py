@@ -91,8 +91,8 @@ class Section:
             "observed": ("observation", "observations"),
             "not evaluated": ("not evaluated", "not evaluated"),
         }
-        there = [(counts[verdict], *forms) for verdict, forms in words.items() if verdict in counts]
-        return ", ".join(f"{n} {singular if n == 1 else plural}" for n, singular, plural in there)
+        counted = [(counts[verdict], *forms) for verdict, forms in words.items() if verdict in counts]
+        return ", ".join(f"{n} {singular if n == 1 else plural}" for n, singular, plural in counted)
 
 
 def sections(gathered: Gathered, results: Mapping[str, ChapterResult], templates: Environment) -> tuple[Section, ...]:
@@ -109,11 +109,11 @@ def sections(gathered: Gathered, results: Mapping[str, ChapterResult], templates
             figure=next((figure.name for result in chapters for figure in result.figures), ""),
         )
 
-    there = (
+    contents = (
         (part, [results[chapter.name] for chapter in part.chapters if chapter.name in results])
         for part in gathered.parts
     )
-    return tuple(section(part, chapters) for part, chapters in there if chapters)
+    return tuple(section(part, chapters) for part, chapters in contents if chapters)
 
 
 def _chapter(gathered: Gathered, result: ChapterResult, templates: Environment) -> Markup:

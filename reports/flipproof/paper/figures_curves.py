@@ -237,8 +237,8 @@ def _step_words(runs: PaperRuns) -> Iterator[str]:
         *fewer, most = sorted(by_value) or [0.0]
         for steps in fewer:
             run, finest = by_value[steps], by_value[most]
-            there = np.interp(run.t, finest.t, finest.omega)
-            far = float(np.abs(run.omega - there).max()) / run.scenario.omega0
+            reference = np.interp(run.t, finest.t, finest.omega)
+            far = float(np.abs(run.omega - reference).max()) / run.scenario.omega0
             yield f"filling {filling:g} with {steps:g} steps {far:.2g}"
 
 

@@ -127,12 +127,12 @@ def study(ask: Ask) -> Study[Differences]:
             finer=(refined[first], refined[second]) if {first, second} <= set(refined) else None,
         )
 
-    tried = {pair: attempt(compared, *pair) for pair in pairs if set(pair[1:]) <= set(runs)}
-    differences = tuple(known(tried).values())
+    outcomes = {pair: attempt(compared, *pair) for pair in pairs if set(pair[1:]) <= set(runs)}
+    differences = tuple(known(outcomes).values())
     free, ended = flown.get(FREE), ""
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
-    missing = {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason}
+    missing = {pair: outcome.reason for pair, outcome in outcomes.items() if outcome.reason}
     return Differences(differences, ended, missing, guests)
 
 

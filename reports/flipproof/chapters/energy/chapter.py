@@ -47,5 +47,10 @@ def claims(results: Energy) -> Claims:
 
 
 CHAPTER: Final = Chapter(
-    "energy", "Where the energy goes", study, claims, kind="regression", page=lambda it: {"made": known(it.ledgers)}
+    "energy",
+    "Where the energy goes",
+    study,
+    claims,
+    kind="regression",
+    page=lambda results: {"made": known(results.ledgers)},
 )

@@ -166,15 +166,15 @@ def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
 
 def study_horizon(solver: str, own: bool, levels: Sequence[Level], flights: Flights) -> Horizon:
     """Read the ensembles of a solver; one that could not be run, as an engine that is not installed, has none."""
-    tried = [
+    outcomes = [
         (level, attempt(lambda runs: Ensemble.of([flights[run].flight for run in runs], BAND), level.runs))
         for level in levels
     ]
     return Horizon(
         solver=solver,
         own=own,
-        ensembles=tuple((level, outcome.found) for level, outcome in tried if outcome.found is not None),
-        problems=tuple(dict.fromkeys(outcome.reason for _, outcome in tried if outcome.reason)),
+        ensembles=tuple((level, outcome.found) for level, outcome in outcomes if outcome.found is not None),
+        problems=tuple(dict.fromkeys(outcome.reason for _, outcome in outcomes if outcome.reason)),
     )
 
 

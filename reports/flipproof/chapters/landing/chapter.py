@@ -41,7 +41,7 @@ def study(ask: Ask) -> Study[LandingStudy]:
 
 def made(wave: str, cases: Cases, seed: int) -> Generator[list[Call], Flights, list[list[Landed]]]:
     """Ask workers for the throws of some cases, and return their rows, case by case."""
-    calls = [Call(make_cases, (some, seed), f"landing, {wave}") for some in chunks(tuple(cases.values()))]
+    calls = [Call(make_cases, (chunk, seed), f"landing, {wave}") for chunk in chunks(tuple(cases.values()))]
     flights = yield calls
     return [rows for call in calls for rows in flights.answer(call)]
 
@@ -54,7 +54,7 @@ def chunks(cases: Sequence[Case]) -> list[tuple[Case, ...]]:
     """
     starts = accumulate((case.throws for case in cases), initial=0)
     groups = groupby(zip(cases, starts, strict=False), key=lambda pair: pair[1] // 300)
-    return [tuple(case for case, _ in some) for _, some in groups]
+    return [tuple(case for case, _ in group) for _, group in groups]
 
 
 def claims(results: LandingStudy) -> Iterator[Finding]:

@@ -238,13 +238,13 @@ def aiming(throw: Scenario, size: Size) -> tuple[Cases, Mapping[Place, str]]:
 
 def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
     """Return the throws that are counted, about the aims that stood most often, and the map."""
-    tried: dict[Place, list[tuple[tuple[int, float], Share, Aim]]] = {}
-    for (key, case), some in zip(aims.items(), rows, strict=True):
-        share = share_of(some)
+    candidates: dict[Place, list[tuple[tuple[int, float], Share, Aim]]] = {}
+    for (key, case), throws in zip(aims.items(), rows, strict=True):
+        share = share_of(throws)
         # Of equals the least offset.
-        tried.setdefault(key.place, []).append(((share.upright, -abs(key.value)), share, case.aim))
+        candidates.setdefault(key.place, []).append(((share.upright, -abs(key.value)), share, case.aim))
     aim_of: dict[Place, Aim] = {}
-    for place, ranked in tried.items():
+    for place, ranked in candidates.items():
         ranked.sort(key=lambda candidate: candidate[0])
         *others, (_, _, aim) = ranked
         aim_of[place] = replace(aim, rival=max((share.interval[1] for _, share, _ in others), default=0.0))
@@ -329,20 +329,20 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
     counted: dict[Key, tuple[Aim, list[Landed]]] = {}
     shape = len(omegas), len(fillings)
     maps: dict[Kind, Outcomes] = {}
-    for (key, case), some in zip(cases.items(), rows, strict=True):
+    for (key, case), throws in zip(cases.items(), rows, strict=True):
         if key.axis == "map":
             outcomes = maps.setdefault(key.kind, Outcomes(np.full(shape, "", "U9"), np.full(shape, np.nan)))
             at = omegas.tolist().index(key.value), fillings.tolist().index(key.filling)
-            outcomes.outcome[at] = some[0].outcome or some[0].status
-            outcomes.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
+            outcomes.outcome[at] = throws[0].outcome or throws[0].status
+            outcomes.theta[at] = np.nan if throws[0].touch_theta is None else throws[0].touch_theta
             continue
-        counted.setdefault(key._replace(cut=0), (case.aim, []))[1].extend(some)
+        counted.setdefault(key._replace(cut=0), (case.aim, []))[1].extend(throws)
         if key.axis == "filling":
             below, above = sorts.setdefault((key.family, key.kind), ([], []))
-            decided = [row for row in some if row.outcome not in (None, "undecided")]
+            decided = [row for row in throws if row.outcome not in (None, "undecided")]
             below += [row for row in decided if (row.static_margin or 0.0) > 0.0]
             above += [row for row in decided if not (row.static_margin or 0.0) > 0.0]
-    cells = {key: cell_of(aim, some) for key, (aim, some) in counted.items()}
+    cells = {key: cell_of(aim, throws) for key, (aim, throws) in counted.items()}
     return LandingStudy(
         throw=throw,
         size=size,
@@ -377,14 +377,14 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
 
 def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
     """Follow the energy of the first ten throws counted at the filling of the axes."""
-    wanted = Key("filling", size.axis_filling, size.families[-1], size.axis_filling, kind, size.cuts[0])
-    if wanted not in cases:
+    key = Key("filling", size.axis_filling, size.families[-1], size.axis_filling, kind, size.cuts[0])
+    if key not in cases:
         return []
-    case, some = cases[wanted], rows[list(cases).index(wanted)]
+    case, throws = cases[key], rows[list(cases).index(key)]
     design = Throws(cases=(case,), seed=size.seed)
     table = Table(height=case.aim.height, restitution=case.restitution, friction=case.friction)
     energies = []
-    for place, row in enumerate(islice(some, 10)):
+    for place, row in enumerate(islice(throws, 10)):
         if row.outcome not in (None, "undecided"):
             run = path(fly(design.thrown(case, place), table), table, case.law, duration=0.45)
             energies.append(Energy(kind, run.t, run.energy / run.saddle, str(row.outcome)))

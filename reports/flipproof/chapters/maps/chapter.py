@@ -315,7 +315,7 @@ def _outline(inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarit
             (below, ((left, low), (right, low))),
             (above, ((left, high), (right, high))),
         )
-        segments += [np.array(side) for there, side in sides if there]
+        segments += [np.array(side) for outer, side in sides if outer]
     if logarithmic:
         for side in segments:
             side[:, 1] = np.exp(side[:, 1])
