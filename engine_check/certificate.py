@@ -123,8 +123,8 @@ class Certificate:
     @property
     def residuals(self) -> dict[str, float]:
         """Largest residuals of the run: of L, of momentum, of constraints, and the penetration, as far as watched."""
-        known = self.trajectory.diagnostics
-        return {name: float(known[name]) for name in RESIDUALS if name in known}
+        diagnostics = self.trajectory.diagnostics
+        return {name: float(diagnostics[name]) for name in RESIDUALS if name in diagnostics}
 
     @property
     def largest_band(self) -> float:
@@ -300,13 +300,13 @@ def _band(runs: Runs, at: Trial, run: Trajectory, order: float) -> tuple[FloatAr
             # Half a step is half the error only if an order is observed.
             causes[EARLIER] = runs.apart(coarsest, coarse) / (2 if math.isfinite(order) else 1)
         if runs.movable:
-            for role, asked in (
+            for role, change in (
                 (MOVED, runs.delay(at.dt, at.iterations)),
                 (SHAKEN, runs.shake(2 * at.dt, at.iterations)),
             ):
-                if isinstance(asked, Trajectory):
-                    return nothing, f"{role}: {asked.message}"
-                causes[role] = asked
+                if isinstance(change, Trajectory):
+                    return nothing, f"{role}: {change.message}"
+                causes[role] = change
         band = SAFETY * np.max(list(causes.values()), axis=0)
         widest = max(causes, key=lambda role: float(causes[role].max()))
         moved = float(causes[widest].max())

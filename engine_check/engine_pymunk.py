@@ -178,7 +178,7 @@ class _Flight:
             for name, value in residuals.items():
                 self._worst[name] = max(self._worst[name], value)
             bounds = (watch.BOUNDS, rods.BOUNDS) if self._exclude else (watch.BOUNDS,)
-            left = (watch.first_left(residuals, each)[0] for each in bounds)
+            left = (watch.first_left(residuals, limits)[0] for limits in bounds)
             self._reason = next(filter(None, left), "")
             cause = watch.broken(residuals, self._cap_thickness)
             return cause or (rods.broken(residuals, self._scenario) if self._exclude else "")

@@ -121,11 +121,11 @@ def check_asked(scenario: Scenario, engine: str, ice: str, slices: str) -> None:
     if engine not in ENGINES:
         raise ValueError(unknown_name("engine =", engine, ENGINES))
     has = ENGINES[engine]
-    asked = (
+    choices = (
         ("ice", ice, ICE_MODELS, ICE_MODELS),
         ("slices", slices, CONTACTS, has.contacts),
     )
-    for what, name, known, offered in asked:
+    for what, name, known, offered in choices:
         if name not in known:
             raise ValueError(unknown_name(f"{what} =", name, known))
         if name not in offered:

@@ -111,9 +111,9 @@ def read_back(tube: pymunk.Body, slices: Sequence[pymunk.Body]) -> dict[str, flo
         "off_centre": [a.offset.length + b.offset.length for a, b in contacts],
         "distance": [a.radius + b.radius for a, b in contacts],
     }
-    for name, known in values.items():
-        if known:
-            held |= {f"neighbour_{name}.least": min(known), f"neighbour_{name}.most": max(known)}
+    for name, numbers in values.items():
+        if numbers:
+            held |= {f"neighbour_{name}.least": min(numbers), f"neighbour_{name}.most": max(numbers)}
     return held
 
 

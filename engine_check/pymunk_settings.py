@@ -156,10 +156,10 @@ class PymunkKnobs:
     @classmethod
     def from_overrides(cls, overrides: Mapping[str, float]) -> PymunkKnobs:
         """Return the defaults with some knobs changed; an unknown name raises ValueError with the nearest."""
-        known = [f.name for f in fields(cls)]
+        names = [f.name for f in fields(cls)]
         for name in overrides:
-            if name not in known:
-                raise ValueError(unknown_name("knob =", name, known))
+            if name not in names:
+                raise ValueError(unknown_name("knob =", name, names))
         return cls(**overrides)  # type: ignore[arg-type]
 
     def to_mapping(self) -> dict[str, float | None]:

@@ -19,11 +19,11 @@ def differences(meant: Mapping[str, float], held: Mapping[str, float], scales: M
     """
     problems = []
     for name, value in meant.items():
-        got = held.get(name, math.nan)
+        actual = held.get(name, math.nan)
         scale = max(abs(value), scales.get(name, 0.0))
-        if got == value or abs(got - value) <= ROUND_OFF * scale:
+        if actual == value or abs(actual - value) <= ROUND_OFF * scale:
             continue
-        problems.append(f"{name} = {got!r}, meant {value!r}")
+        problems.append(f"{name} = {actual!r}, meant {value!r}")
     return problems
 
 
@@ -41,7 +41,7 @@ def both(name: str, value: float) -> dict[str, float]:
 
 def extremes(name: str, values: Iterable[float]) -> dict[str, float]:
     """Return ``name.least`` and ``name.most``; nothing for no values, NaN if one is NaN."""
-    known = [float(value) for value in values]
-    if any(math.isnan(value) for value in known):
+    numbers = [float(value) for value in values]
+    if any(math.isnan(value) for value in numbers):
         return both(name, math.nan)
-    return {f"{name}.least": min(known), f"{name}.most": max(known)} if known else {}
+    return {f"{name}.least": min(numbers), f"{name}.most": max(numbers)} if numbers else {}

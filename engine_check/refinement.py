@@ -237,8 +237,8 @@ class Runs:
 
     def spread(self, run: Trajectory, iterations: int | None) -> FloatArray:
         """Return how far any complete run at these iterations, and any bend, lies from ``run``, shape (P,)."""
-        made = [*self._made.items(), *self._moved.items()]
-        others = [self.apart(run, other) for (_, n), other in made if n == iterations and other.ok]
+        runs = [*self._made.items(), *self._moved.items()]
+        others = [self.apart(run, other) for (_, n), other in runs if n == iterations and other.ok]
         return np.asarray(np.max([*others, *(bent for (_, n), bent in self._bent.items() if n == iterations)], axis=0))
 
     def bent(self, dt: float, iterations: int | None) -> FloatArray | None:

@@ -74,8 +74,8 @@ class Rebound:
 
     def __str__(self) -> str:
         """Return what was asked and measured, in words."""
-        got = self.reason or f"measured {self.measured:.4g}"
-        return f"restitution {self.asked:g} at the {self.end}: {got}"
+        measurement = self.reason or f"measured {self.measured:.4g}"
+        return f"restitution {self.asked:g} at the {self.end}: {measurement}"
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the fields by name; what is not a number becomes None."""

@@ -102,13 +102,13 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
     except ValueError:
         pass
     speed, how = settings["rest_speed"], {"impact_law": settings["impact_law"], **own}
-    asked = [{"twin": k, "rest_speed": speed} for k in range(1, twins + 1)]
-    asked.append({"rest_speed": max(speed / CUT, MIN_REST_SPEED)})
+    variants = [{"twin": k, "rest_speed": speed} for k in range(1, twins + 1)]
+    variants.append({"rest_speed": max(speed / CUT, MIN_REST_SPEED)})
     if own["method"] != settings["method"]:
-        asked.append({"rest_speed": speed})
-    omega = np.full((len(asked), len(flight.t)), np.inf)
-    for row, one in zip(omega, asked, strict=True):
-        other = solve(flight.scenario, settings["model"], flight.t, **how, **one).omega
+        variants.append({"rest_speed": speed})
+    omega = np.full((len(variants), len(flight.t)), np.inf)
+    for row, variant in zip(omega, variants, strict=True):
+        other = solve(flight.scenario, settings["model"], flight.t, **how, **variant).omega
         row[: len(other)] = other
     size = band_of(flight.omega, omega) / abs(flight.scenario.omega0)
-    return Band(flight.t, np.maximum.accumulate(size), len(asked))
+    return Band(flight.t, np.maximum.accumulate(size), len(variants))

@@ -85,7 +85,7 @@ class Piles(NamedTuple):
     @property
     def columns(self) -> Piles:
         """The same as columns, shape (P, 1) each."""
-        return Piles(*(np.asarray(each)[:, np.newaxis] for each in self))
+        return Piles(*(np.asarray(lengths)[:, np.newaxis] for lengths in self))
 
 
 class Rods:
@@ -246,17 +246,17 @@ def _states(
     """Return (theta, A - 1, A', z, z') at ``moments``, shape (5, P), the piles then, and when water is at the cap."""
     y, t, arrival = np.array([scenario.theta0, 0.0, 0.0, 0.0, 0.0]), 0.0, None
     states = np.tile(y[:, np.newaxis], len(moments))
-    piles = Piles(*(np.full(len(moments), each) for each in rods.at_rest))
+    piles = Piles(*(np.full(len(moments), length) for length in rods.at_rest))
     if not rods.spreads:
         states[0] += scenario.omega0 * moments
         return states, piles, None
     for arrived in (False, True):
         run = _integrate(rods, (t, scenario.duration), y, arrived, rtol, atol)
         t, y = float(run.t[-1]), run.y[:, -1].copy()
-        here = (moments >= run.t[0]) & (moments <= t)
-        if here.any():
-            states[:, here] = run.sol(moments[here])
-            _fill(piles, rods.piles(states[1, here], states[3, here], arrived), here)
+        within = (moments >= run.t[0]) & (moments <= t)
+        if within.any():
+            states[:, within] = run.sol(moments[within])
+            _fill(piles, rods.piles(states[1, within], states[3, within], arrived), within)
         path = rods.piles(run.y[1], run.y[3], arrived)
         for name, pile in (("base", path.base), ("cap", path.cap)):
             if np.any(np.diff(pile) < -SHRINKS * rods.length):

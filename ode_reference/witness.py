@@ -210,9 +210,9 @@ class _Flight:
 
     def _slope(self, t: float, y: FloatArray) -> FloatArray:
         """Return dy/dt; stop the run if time has ceased to pass."""
-        count, since = self.watched
+        count, start = self.watched
         if self.motion.evaluations - count >= WATCH:
-            if t - since < MIN_ADVANCE * self.scenario.duration or self.motion.evaluations > 16 * STEP_LIMIT:
+            if t - start < MIN_ADVANCE * self.scenario.duration or self.motion.evaluations > 16 * STEP_LIMIT:
                 raise _StandstillError
             self.watched = (self.motion.evaluations, t)
         return self.motion(t, y)
@@ -251,7 +251,7 @@ class _Flight:
         begin, n, r, v = self.t, self.n, self.y[1 : self.n + 1], self.y[self.n + 1 :]
         near = np.abs(self.ends.beyond(side, r)) <= self.ends.reach
         leaves = np.flatnonzero(~self.motion.held & near & (side * v <= 0))
-        asked = ~self.motion.held if who is None else np.arange(n) == who
+        chosen = ~self.motion.held if who is None else np.arange(n) == who
 
         def foremost(t: float, y: FloatArray) -> float:
             beyond = self.ends.beyond(side, y[1 : n + 1])
@@ -259,7 +259,7 @@ class _Flight:
                 distance, speed = beyond[leaves], side * y[n + 1 :][leaves]
                 still = (speed <= 0) & (distance <= TOUCH * self.scenario.bottle.length)
                 beyond[leaves] = np.where(still, np.minimum(speed, -LEAST), distance / max(t - begin, LEAST))
-            return float(beyond.max(where=asked, initial=-1.0))
+            return float(beyond.max(where=chosen, initial=-1.0))
 
         return foremost
 

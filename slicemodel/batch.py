@@ -146,7 +146,7 @@ def solve_batch(
         return [run(i) for i in range(first, min(first + part, len(throws)))]
 
     with ThreadPoolExecutor(workers) as pool:
-        runs = tuple(done for some in pool.map(run_part, range(0, len(throws), part)) for done in some)
+        runs = tuple(done for chunk in pool.map(run_part, range(0, len(throws), part)) for done in chunk)
     rows.setflags(write=False)
     return Batch(scenarios=throws, scheme=chosen, form=form, rows=rows, runs=runs)
 

@@ -34,8 +34,8 @@ def inner(function: Function) -> Function:
     """Compile a function that compiled ones alone call: what Python needs to call it takes a third of the time."""
     # The names of these options are missing from numba's types.
     unwrapped: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    made: Function = numba.njit(function, **OPTIONS, **unwrapped)
-    return made
+    dispatcher: Function = numba.njit(function, **OPTIONS, **unwrapped)
+    return dispatcher
 
 
 def merged(function: Callable[..., Any]) -> Any:

@@ -99,8 +99,8 @@ class _Checks:
             number = math.inf
         # Written as "not inside", because NaN passes every "outside" test.
         if not least <= number <= most:
-            told = f"{self.where}{name} = {number!r} {unit}".rstrip()
-            self.problems.append(f"{told} is outside [{least:g}, {most:g}]")
+            given = f"{self.where}{name} = {number!r} {unit}".rstrip()
+            self.problems.append(f"{given} is outside [{least:g}, {most:g}]")
             return None
         return number
 
@@ -415,8 +415,8 @@ class Scenario:
         bottle_table = document.get("bottle", {})
         scenario_table = dict(document.get("scenario", {}))
         _refuse_unknown(bottle_table, [f.name for f in fields(Bottle)], f"{source}: [bottle] key")
-        known = [f.name for f in fields(cls) if f.name != "bottle"]
-        _refuse_unknown(scenario_table, known, f"{source}: [scenario] key")
+        names = [f.name for f in fields(cls) if f.name != "bottle"]
+        _refuse_unknown(scenario_table, names, f"{source}: [scenario] key")
         if isinstance(scenario_table.get("launch_velocity"), list):
             scenario_table["launch_velocity"] = tuple(scenario_table["launch_velocity"])
         try:
@@ -462,8 +462,8 @@ def unknown_name(what: str, given: object, known: Iterable[str]) -> str:
     return f"{what} {shown(given)} is unknown; {advice}"
 
 
-def _refuse_unknown(given: Iterable[str], known: Iterable[str], what: str) -> None:
-    known = list(known)
+def _refuse_unknown(given: Iterable[str], allowed: Iterable[str], what: str) -> None:
+    allowed = list(allowed)
     for name in given:
-        if name not in known:
-            raise ScenarioError(unknown_name(what, name, known))
+        if name not in allowed:
+            raise ScenarioError(unknown_name(what, name, allowed))

@@ -32,12 +32,12 @@ class Vector:
 
 def folder() -> Path:
     """Return where the vectors are: inside the installed package, or beside it in a checkout."""
-    here = Path(__file__).resolve().parent
-    for place in (here / "published", here.parent / "tests" / "vectors"):
+    package = Path(__file__).resolve().parent
+    for place in (package / "published", package.parent / "tests" / "vectors"):
         if place.is_dir():
             return place
     raise FileNotFoundError(
-        f"the published vectors are neither in {here / 'published'} nor in a checkout's tests/vectors"
+        f"the published vectors are neither in {package / 'published'} nor in a checkout's tests/vectors"
     )
 
 

@@ -259,7 +259,7 @@ def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, objec
 
     names = {UPRIGHT: "upright", LYING: "lying", CAP: "cap"}
     run, *twins = runs
-    codes = {each.code for each in runs}
+    codes = {landing.code for landing in runs}
     reason = ""
     if BROKEN in codes:
         reason = "the motion left the floating-point range or stopped passing time"
@@ -284,8 +284,8 @@ def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, objec
         settings=settings,
         diagnostics={
             "energy_rise": run.rise,
-            "steps": sum(each.steps for each in runs),
+            "steps": sum(landing.steps for landing in runs),
             "impacts": run.impacts,
-            "outcomes": [names.get(each.code, "") for each in runs],
+            "outcomes": [names.get(landing.code, "") for landing in runs],
         },
     )

@@ -64,10 +64,10 @@ def ask_of(
     beside the other solvers.
     """
     throw = scenario.with_slices(slices or min(SLICES, scenario.n_slices))
-    known = {guest.label: guest for guest in guests if guest.traits is not None}
-    ask = Ask(scenario=scenario, throw=throw, size=size, guests=known)
+    loaded = {guest.label: guest for guest in guests if guest.traits is not None}
+    ask = Ask(scenario=scenario, throw=throw, size=size, guests=loaded)
     solvers = solver_runs(throw, ask.steps, CERTIFIED[size] if certified is None else certified)
-    return replace(ask, solvers=solvers | {label: guest.run(throw) for label, guest in known.items()})
+    return replace(ask, solvers=solvers | {label: guest.run(throw) for label, guest in loaded.items()})
 
 
 def gather_report(
@@ -105,25 +105,27 @@ def build(
     results = evaluate(gathered)
     with gathered.stages.lap("figures"):
         exhibits = drawn(
-            [figure for each in results.values() for figure in each.figures],
+            [figure for result in results.values() for figure in result.figures],
             pool or SerialExecutor(),
             progress,
             png=png,
         )
     rest = iter(exhibits)
-    results = {name: replace(each, figures=tuple(islice(rest, len(each.figures)))) for name, each in results.items()}
+    results = {
+        name: replace(result, figures=tuple(islice(rest, len(result.figures)))) for name, result in results.items()
+    }
     summary = summarise(gathered, results, provenance, verdict(gathered))
     with gathered.stages.lap("page"):
         pages = render(gathered, results, provenance, summary)
     summary["stages"]["page"] = round(gathered.stages.seconds["page"], 3)
-    made = [each for each in results.values() if each.found is not None]
+    present = [result for result in results.values() if result.found is not None]
     return Report(
-        findings=tuple(finding for each in results.values() for finding in each.findings),
+        findings=tuple(finding for result in results.values() for finding in result.findings),
         exhibits=exhibits,
         pages=pages,
         summary=summary,
-        tables={path: text for each in made for path, text in each.chapter.tables(each.found).items()},
-        seconds={id_: seconds for each in results.values() for id_, seconds in each.seconds.items()},
+        tables={path: text for result in present for path, text in result.chapter.tables(result.found).items()},
+        seconds={id_: seconds for result in results.values() for id_, seconds in result.seconds.items()},
         whole=sum(gathered.stages.seconds.values()),
     )
 
@@ -138,8 +140,8 @@ def write(report: Report, folder: Path) -> None:
         **report.tables,
     }
     for exhibit in report.exhibits:
-        made = {"svg": exhibit.drawing.svg, "png": exhibit.drawing.png or None, "csv": exhibit.table}
-        files |= {f"figures/{exhibit.name}.{kind}": content for kind, content in made.items()}
+        contents = {"svg": exhibit.drawing.svg, "png": exhibit.drawing.png or None, "csv": exhibit.table}
+        files |= {f"figures/{exhibit.name}.{kind}": content for kind, content in contents.items()}
     for path, content in files.items():
         if content is not None:
             place = folder / path

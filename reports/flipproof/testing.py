@@ -45,8 +45,8 @@ def parametrize_with_checks(spec: str, checks: Iterable[str] = tuple(CHECKS)) ->
     import pytest
 
     runner = functools.cache(lambda: opened(spec))
-    made = {name: functools.partial(_check, name, runner) for name in checks}
-    return pytest.mark.parametrize("check", made.values(), ids=made.keys())
+    tests = {name: functools.partial(_check, name, runner) for name in checks}
+    return pytest.mark.parametrize("check", tests.values(), ids=tests.keys())
 
 
 def assert_ice_constant(spec: str) -> None:
@@ -63,11 +63,11 @@ def assert_curves_agree(first: str, second: str, *, twins: Iterable[str] = (), *
 
     columns = options.get("columns")
     of_second = [read(path, columns) for path in options.pop("twins_of_second", ())]
-    found = compare(
+    comparison = compare(
         read(first, columns),
         read(second, columns),
         twins=[read(path, columns) for path in twins],
         twins_of_second=of_second,
         **options,
     )
-    assert found.passed, "\n".join(found.lines)
+    assert comparison.passed, "\n".join(comparison.lines)

@@ -128,7 +128,7 @@ class Guest:
 
 def invited(specs: Sequence[str], timeout: float | None = None) -> tuple[Guest, ...]:
     """Load the solvers that specs name, and return what each says of itself, or why it says nothing."""
-    found: list[Guest] = []
+    guests: list[Guest] = []
     for k, spec in enumerate(specs):
         given: dict[str, Any] = {"spec": spec, "timeout": timeout}
         name = spec
@@ -139,13 +139,13 @@ def invited(specs: Sequence[str], timeout: float | None = None) -> tuple[Guest, 
                 name = runner.traits.name
         except ValueError as error:
             given["problem"] = str(error)
-        taken = not is_foreign(name) or any(name == guest.label for guest in found)
+        taken = not is_foreign(name) or any(name == guest.label for guest in guests)
         label = f"{name} ({spec})" if taken else name
         slug = re.sub(r"[^a-z0-9]+", "-", label.lower()).strip("-")
         slug = slug if 0 < len(slug) <= 60 else f"solver-{k + 1}"
-        slug += f"-{k + 1}" if any(slug == guest.slug for guest in found) else ""
-        found.append(Guest(label=label, slug=slug, **given))
-    return tuple(found)
+        slug += f"-{k + 1}" if any(slug == guest.slug for guest in guests) else ""
+        guests.append(Guest(label=label, slug=slug, **given))
+    return tuple(guests)
 
 
 def facts_of(guests: Sequence[Guest]) -> dict[str, str]:

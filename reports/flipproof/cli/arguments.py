@@ -144,7 +144,7 @@ def refuse_overwriting(options: argparse.Namespace, command: argparse.ArgumentPa
     given = vars(options)
     written = [action.dest for action in command._actions if action.type is output]
     values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
-    texts = [str(each) for value in values for each in value if isinstance(each, str | Path)]
+    texts = [str(element) for value in values for element in value if isinstance(element, str | Path)]
     for name in written:
         path = given.get(name)
         if isinstance(path, Path) and path.is_file() and any(path.samefile(file) for file in _read_by(texts)):

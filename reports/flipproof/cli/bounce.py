@@ -38,17 +38,17 @@ def command_bounce(options: argparse.Namespace) -> int:
     passports = []
     for adapter in map(load, options.adapter):
         print(inert(adapter.name) + f", step {options.dt:g} s")
-        made = []
+        measurements = []
         with progress_bar(adapter.name, "measurement") as progress:
             for measurement in measure(adapter, options.dt):
-                made.append(measurement)
-                progress(len(made), max(len(made) + 1, 9), measurement.name)
+                measurements.append(measurement)
+                progress(len(measurements), max(len(measurements) + 1, 9), measurement.name)
         print(inert("".join(f"  {name} = {value}\n" for name, value in adapter.settings.items())), end="")
-        for measurement in made:
+        for measurement in measurements:
             print(inert(f"{'!' if measurement.remark else ' '} {measurement.name:<14} {measurement.sentence}"))
             if measurement.remark:
                 print(inert(f"  {'':<14} {measurement.remark}"))
-        passports.append(Passport(adapter.name, adapter.settings, options.dt, tuple(made)))
+        passports.append(Passport(adapter.name, adapter.settings, options.dt, tuple(measurements)))
     write_json(options.json, {"passports": [passport.to_mapping() for passport in passports]})
     if options.plot:
         from flipproof.bounce.figure import picture

@@ -110,7 +110,8 @@ def command_check(options: argparse.Namespace) -> int:
         )  # fmt: skip
     write_junit(options.junit, checked.findings, "flipproof check", checked.seconds)
     write_json(
-        options.json, {"findings": [one.to_mapping() for one in checked.findings], "conclusion": checked.conclusion}
+        options.json,
+        {"findings": [finding.to_mapping() for finding in checked.findings], "conclusion": checked.conclusion},
     )
     print(inert(checked.conclusion), flush=True)
     return 1 if checked.failed else 0
@@ -119,11 +120,11 @@ def command_check(options: argparse.Namespace) -> int:
 def _groups(text: str) -> tuple[str, ...]:
     from flipproof.check.throw import groups
 
-    given, known = [word.strip() for word in text.split(",") if word.strip()], groups()
-    unknown = [word for word in given if word not in known]
+    given, available = [word.strip() for word in text.split(",") if word.strip()], groups()
+    unknown = [word for word in given if word not in available]
     if unknown or not given:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r} is not among {', '.join(known)}")
-    return tuple(group for group in known if group in given)
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r} is not among {', '.join(available)}")
+    return tuple(group for group in available if group in given)
 
 
 def add_compare(commands: Any) -> None:
@@ -237,11 +238,11 @@ def command_compare(options: argparse.Namespace) -> int:
         words = doubt(run, seconds, TRUSTED if options.tolerance is None else options.tolerance)
         return replace(Curve.of(run), notes=(words,) if words else ())
 
-    found = compare(load(options.first), load(options.second))
-    print(inert(table(found)))
+    comparison = compare(load(options.first), load(options.second))
+    print(inert(table(comparison)))
     allowed = math.inf if options.tolerance is None else options.tolerance
-    held = claims(found, allowed)
-    write_json(options.json, {**found.to_mapping(), "findings": [finding.to_mapping() for finding in held]})
+    held = claims(comparison, allowed)
+    write_json(options.json, {**comparison.to_mapping(), "findings": [finding.to_mapping() for finding in held]})
     if options.tolerance is None:
         return 0
     write_junit(options.junit, held, "flipproof compare")

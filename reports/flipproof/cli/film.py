@@ -131,20 +131,20 @@ def command_film(options: argparse.Namespace) -> int:
     for judged in films:
         film = judged[0].estimate.film
         lines += [f"{film.label}: {len(film.t)} frames ({'; '.join(film.notes)})"]
-        for one in judged:
-            lines += one.lines()
+        for judgement in judged:
+            lines += judgement.lines()
         lines += [compared(judged), ""]
     if each:
         lines += _shared(*together([judged[0] for judged in films]))
     text = "\n".join(lines).rstrip()
     print(text)
     if options.out is not None:
-        made: Mapping[str, str] = provenance(command_line())
+        facts: Mapping[str, str] = provenance(command_line())
         with replaced_folder(options.out, options.kind) as folder:
             for k, judged in enumerate(films):
                 place = folder / f"film-{k + 1}" if each else folder
                 place.mkdir(exist_ok=True)
-                page.write(judged, text, place, made)
+                page.write(judged, text, place, facts)
         print(f"written  {options.out / ('film-1/index.html' if each else 'index.html')}")
     return 0
 

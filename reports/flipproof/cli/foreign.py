@@ -36,15 +36,15 @@ def add_foreign(commands: Any) -> None:
     )
     _add_spec(certify)
     certify.add_argument("--equation", metavar="E", help="test the solver against this equation, whatever it declares")
-    said = certify.add_argument_group("for a cmd: or csv: solver, which cannot declare these itself")
-    said.add_argument("--name", help="its name")
-    said.add_argument("--refined-by", choices=("dt", "steps", "rtol"), help="what its effort is")
-    said.add_argument(
+    declared = certify.add_argument_group("for a cmd: or csv: solver, which cannot declare these itself")
+    declared.add_argument("--name", help="its name")
+    declared.add_argument("--refined-by", choices=("dt", "steps", "rtol"), help="what its effort is")
+    declared.add_argument(
         "--precision",
         choices=("float64", "float32", "8 digits", "7 digits", "6 digits"),
         help="of its arithmetic, or of what it prints",
     )
-    said.add_argument("--order", type=float, metavar="P", help="order of its error before impacts")
+    declared.add_argument("--order", type=float, metavar="P", help="order of its error before impacts")
     certify.add_argument("--seed", type=int, metavar="K", help="seed of the random throws of the check elsewhere")
     add_json(certify, "the passport (traits, results, versions)")
     certify.add_argument("--junit", type=output, metavar="FILE", help="write the verdicts as JUnit XML")
@@ -136,18 +136,18 @@ def command_certify(options: argparse.Namespace) -> int:
 
     seed = SEED if options.seed is None else options.seed
     with closing(_opened(options, **given)) as runner:
-        found = certify(runner, equation=options.equation, seed=seed, say=lambda result: say(result.line))
-        write_json(options.json, found.to_mapping())
-        write_junit(options.junit, findings_of(found), f"flipproof certify {found.traits.name}")
+        certificate = certify(runner, equation=options.equation, seed=seed, say=lambda result: say(result.line))
+        write_json(options.json, certificate.to_mapping())
+        write_junit(options.junit, findings_of(certificate), f"flipproof certify {certificate.traits.name}")
         if options.badge:
-            write_text(options.badge, badge(found))
-    say(found.conclusion)
+            write_text(options.badge, badge(certificate))
+    say(certificate.conclusion)
     waiting = len(runner.waiting) if isinstance(runner, Folder) else 0
     if waiting:
         questions = "1 question waits" if waiting == 1 else f"{waiting} questions wait"
         say(f"{questions} for answer.csv (columns t, theta, omega; r_0 to r_(N-1), v_0 to v_(N-1) if you have them)")
         say(f"in {runner.folder}; certify again when they are there")
-    return 1 if found.failed or waiting else 0
+    return 1 if certificate.failed or waiting else 0
 
 
 def command_place(options: argparse.Namespace) -> int:
@@ -158,14 +158,14 @@ def command_place(options: argparse.Namespace) -> int:
     with closing(_opened(options)) as runner:
         _ = runner.traits  # loads the solver: one that cannot be loaded is an error, not off the lattice
         try:
-            found = place(runner)
+            placement = place(runner)
         except ForeignError as error:
             words = f"{options.spec} cannot be placed; it does not answer the throws that tell equations apart: {error}"
             print(inert(words, lines=False))
             return 1
-    said = "; ".join(filter(None, (found.text, found.advice)))
-    print(json.dumps(found.to_mapping(), indent=1) if options.json else inert(said))
-    return 0 if found.on_lattice else 1
+    sentence = "; ".join(filter(None, (placement.text, placement.advice)))
+    print(json.dumps(placement.to_mapping(), indent=1) if options.json else inert(sentence))
+    return 0 if placement.on_lattice else 1
 
 
 def command_explain(options: argparse.Namespace) -> int:
@@ -174,6 +174,6 @@ def command_explain(options: argparse.Namespace) -> int:
     from flipproof.foreign.solving import opened
 
     throw = read_scenario(options.scenario, options.slices)
-    with closing(opened(options.first)) as one, closing(opened(options.second)) as other:
-        print(inert(explain(one, other, throw).text))
+    with closing(opened(options.first)) as first, closing(opened(options.second)) as second:
+        print(inert(explain(first, second, throw).text))
     return 0

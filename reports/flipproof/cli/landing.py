@@ -24,7 +24,9 @@ from flipproof.cli.sweeps import add_store, fill
 SLICES: Final = 20
 
 seed = reader("a whole number in [0, 2^63)", digits, lambda value: value < 2**63)
-cells = reader("COLUMNSxROWS, each in [2, 200], such as 24x24", sides, lambda each: min(each) >= 2 and max(each) <= 200)
+cells = reader(
+    "COLUMNSxROWS, each in [2, 200], such as 24x24", sides, lambda counts: min(counts) >= 2 and max(counts) <= 200
+)
 scatter = reader(
     "SPIN,DEGREES,SPEED, three numbers in [0, inf), the largest at least 1e-6: without scatter all throws of a point "
     "are the same throw",

@@ -249,8 +249,8 @@ def command_report(options: argparse.Namespace) -> int:
             report = build(gathered, facts, store.remembering(pool), bar.show, png=options.png)
         write(report, folder)
     for visit in gathered.found("guests") or ():
-        found = visit.certificate.found
-        print(f"{visit.guest.label}: {found.conclusion if found else '; '.join(visit.problems.values())}")
+        certificate = visit.certificate.found
+        print(f"{visit.guest.label}: {certificate.conclusion if certificate else '; '.join(visit.problems.values())}")
     print(f"Cache: {store.whereabouts()}")
     _print_report(report, options.out, time.perf_counter() - began)
     if options.open:

@@ -90,9 +90,9 @@ def progress_bar(title: str, unit: str, *, quiet: bool = False) -> Iterator[Call
     """Give what is to be called with the number made, the number planned and a name; a terminal shows a bar."""
     line = Line(title, hidden=quiet or not sys.stderr.isatty())
 
-    def progress(made: int, planned: int | None, label: str = "") -> None:
-        counted = f"{made} of {planned} {unit}s" if planned else f"{made} {unit}s"
-        line.show(made / planned if planned else 0.0, f"{counted}, {label}" if label else counted)
+    def progress(done: int, planned: int | None, label: str = "") -> None:
+        counted = f"{done} of {planned} {unit}s" if planned else f"{done} {unit}s"
+        line.show(done / planned if planned else 0.0, f"{counted}, {label}" if label else counted)
 
     try:
         yield progress

@@ -60,9 +60,12 @@ def take(report: Path, place: Path = PLACE) -> None:
 
 def front_page(summary: Mapping[str, Any]) -> str:
     """Return what the README says that was found, from a summary alone: a question and its answer a line."""
-    found = [Headline.from_mapping(mapping) for mapping in summary["headlines"]]
+    headlines = [Headline.from_mapping(mapping) for mapping in summary["headlines"]]
     return (
-        "\n".join(fill(_plain(f"- **{asked}** {words}"), 118, subsequent_indent="  ") for asked, words in lines(found))
+        "\n".join(
+            fill(_plain(f"- **{question}** {words}"), 118, subsequent_indent="  ")
+            for question, words in lines(headlines)
+        )
         + "\n"
     )
 

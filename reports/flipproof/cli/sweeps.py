@@ -123,8 +123,8 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
             words = make(begin, where)
     except KeyboardInterrupt:
         # An interrupt may fall between the storing of rows and their counting, or before older rows were looked at.
-        there = f"at least {stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
-        print(f"flipproof: interrupted; {there}the same command goes on from there", file=sys.stderr)
+        sentence = f"at least {stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
+        print(f"flipproof: interrupted; {sentence}the same command goes on from there", file=sys.stderr)
         return INTERRUPTED
     print(words)
     return 0

@@ -33,7 +33,7 @@ _NAME: Final = re.compile(
 
 def spoken(text: str) -> str:
     """Return text with every solver under its spoken name."""
-    return _NAME.sub(lambda found: SPOKEN[found.group()], text)
+    return _NAME.sub(lambda match: SPOKEN[match.group()], text)
 
 
 def inert(text: str, *, lines: bool = True) -> str:

@@ -125,8 +125,8 @@ def judged(
     """
 
     def evaluate() -> Finding:
-        evidence = (each.flight if isinstance(each, Made) else each for each in about)
-        return claim(*(each.value if isinstance(each, Outcome) else each for each in evidence))
+        evidence = (argument.flight if isinstance(argument, Made) else argument for argument in about)
+        return claim(*(argument.value if isinstance(argument, Outcome) else argument for argument in evidence))
 
     outcome = attempt(evaluate)
     return outcome.found if outcome.found is not None else Absent(id, title, outcome.reason, kind)

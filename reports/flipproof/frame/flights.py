@@ -77,7 +77,7 @@ class Flights(dict[Run, Made]):
 
 def known(outcomes: Mapping[Key, Outcome[T]]) -> dict[Key, T]:
     """Return what was found, without those for whom nothing was."""
-    return {key: each.found for key, each in outcomes.items() if each.found is not None}
+    return {key: outcome.found for key, outcome in outcomes.items() if outcome.found is not None}
 
 
 def attempt(study: Callable[..., T], *about: Any) -> Outcome[T]:

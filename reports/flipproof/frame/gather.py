@@ -96,9 +96,9 @@ def gather(
     wave = 0
     while waiting:
         wave += 1
-        asked = dict.fromkeys(each for _, requests in waiting.values() for each in requests)
-        runs = [each for each in asked if isinstance(each, Run) and each not in flights]
-        calls = [each for each in asked if isinstance(each, Call)]
+        wanted = dict.fromkeys(request for _, requests in waiting.values() for request in requests)
+        runs = [request for request in wanted if isinstance(request, Run) and request not in flights]
+        calls = [request for request in wanted if isinstance(request, Call)]
         with stages.lap(f"runs, wave {wave}"):
             flights.add(*make_all(pool, runs, progress, calls, store))
         with stages.lap("studies"):
@@ -133,20 +133,22 @@ def evaluate(gathered: Gathered) -> dict[str, ChapterResult]:
     """Return the findings and figures of every chapter, by its name; no figure is drawn yet."""
     chapters = {chapter.name: chapter for part in gathered.parts for chapter in part.chapters}
     return {
-        name: _evaluated(each, gathered.outcomes[name]) for name, each in chapters.items() if name in gathered.outcomes
+        name: _evaluated(chapter, gathered.outcomes[name])
+        for name, chapter in chapters.items()
+        if name in gathered.outcomes
     }
 
 
 def _evaluated(chapter: Chapter[Any], outcome: Outcome[Any]) -> ChapterResult:
-    said: list[Finding | Absent] = []
+    findings: list[Finding | Absent] = []
     drawn: list[Exhibit] = []
     seconds: dict[str, float] = {}
 
     def claim() -> None:
         began = time.perf_counter()
-        for each in chapter.claims(outcome.value):
-            seconds[each.id] = time.perf_counter() - began
-            said.append(each)
+        for finding in chapter.claims(outcome.value):
+            seconds[finding.id] = time.perf_counter() - began
+            findings.append(finding)
             began = time.perf_counter()
 
     with chapter_errors(f"chapter {chapter.name!r}, claims"):
@@ -154,12 +156,12 @@ def _evaluated(chapter: Chapter[Any], outcome: Outcome[Any]) -> ChapterResult:
     with chapter_errors(f"chapter {chapter.name!r}, figures"):
         figures = attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
     if reason := claims.reason or figures.reason:
-        said.append(Absent(f"chapter-{chapter.name}", chapter.title, reason, chapter.kind))
+        findings.append(Absent(f"chapter-{chapter.name}", chapter.title, reason, chapter.kind))
     return ChapterResult(
         chapter=chapter,
         found=outcome.found,
-        findings=tuple(each.finding if isinstance(each, Absent) else each for each in said),
+        findings=tuple(finding.finding if isinstance(finding, Absent) else finding for finding in findings),
         figures=tuple(drawn),
-        notes=tuple((each.title, each.reason) for each in said if isinstance(each, Absent)),
+        notes=tuple((absent.title, absent.reason) for absent in findings if isinstance(absent, Absent)),
         seconds=seconds,
     )

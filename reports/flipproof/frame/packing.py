@@ -70,9 +70,9 @@ def _plain(value: Any, arrays: Arrays) -> Any:
         arrays.append(array)
         return [kind, len(arrays) - 1]
     if type(value) in (list, tuple):
-        return [type(value).__name__, [_plain(each, arrays) for each in value]]
+        return [type(value).__name__, [_plain(element, arrays) for element in value]]
     if isinstance(value, Mapping):
-        return ["dict", [[_plain(key, arrays), _plain(each, arrays)] for key, each in value.items()]]
+        return ["dict", [[_plain(key, arrays), _plain(element, arrays)] for key, element in value.items()]]
     cls = type(value)
     if _is_named_tuple(cls) and cls.__module__.partition(".")[0] in OWN:
         return ["data", f"{cls.__module__}:{cls.__qualname__}", _plain(value._asdict(), arrays)[1]]
@@ -88,12 +88,12 @@ def _value(tree: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
         return tree
     kind, content, *rest = tree
     if kind in ("list", "tuple"):
-        values = [_value(each, arrays) for each in content]
+        values = [_value(element, arrays) for element in content]
         return tuple(values) if kind == "tuple" else values
     if kind == "dict":
-        return {_value(key, arrays): _value(each, arrays) for key, each in content}
+        return {_value(key, arrays): _value(element, arrays) for key, element in content}
     if kind == "data":
-        return _class_of(content)(**{name: _value(each, arrays) for name, each in rest[0]})
+        return _class_of(content)(**{name: _value(element, arrays) for name, element in rest[0]})
     array = arrays[f"{content}.npy"]
     return array.tobytes() if kind == "bytes" else array[()] if kind == "scalar" else array
 

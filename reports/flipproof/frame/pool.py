@@ -48,8 +48,8 @@ def make_all(
     died = f"the worker process died {TRIES} times with this"
     keeping = store.remembering(pool)
     pending_calls = {call: (pool if call.timed else keeping).submit(call.function, *call.arguments) for call in calls}
-    made: dict[Run, Made] = {run: found for run in runs if (found := store.find(run)) is not None}
-    jobs = _jobs([run for run in runs if run not in made])
+    finished: dict[Run, Made] = {run: stored for run in runs if (stored := store.find(run)) is not None}
+    jobs = _jobs([run for run in runs if run not in finished])
     costs = {run: COSTS[_kind(run)] for job in jobs for run in job}
     planned, done = sum(costs.values()) + COSTS["call"] * len(pending_calls), 0
 
@@ -76,7 +76,7 @@ def make_all(
                 results = [Made(job[0], None, 0.0, f"{died} run ({error})")]
             for result in results:
                 store.keep(result)
-                made[result.run] = result
+                finished[result.run] = result
                 done += costs[result.run]
                 tell(result.run.name)
     called: dict[Call, Outcome[Any]] = {}
@@ -87,7 +87,7 @@ def make_all(
         except WorkerDiedError as error:
             called[call] = Outcome(None, f"{call.label}: {died} call ({error})")
     # In the order asked, whichever worker was faster: what is read off this table must not depend on load.
-    return {run: made[run] for run in runs}, called
+    return {run: finished[run] for run in runs}, called
 
 
 def compile_kernels(pool: Executor) -> None:

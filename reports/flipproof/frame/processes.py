@@ -106,7 +106,7 @@ class Processes(Executor):
             future, call = task
             if not future.set_running_or_notify_cancel():
                 continue
-            for tried in range(1, self._tries + 1):
+            for attempt in range(1, self._tries + 1):
                 try:
                     worker = worker or self._start()
                     fine, answer = worker.ask(call)
@@ -119,7 +119,7 @@ class Processes(Executor):
                         words += '; a script has to begin its work below `if __name__ == "__main__":`'
                         future.set_exception(NoWorkersError(f"a worker process ended as it started ({words})"))
                         break
-                    if tried == self._tries or self._ended:
+                    if attempt == self._tries or self._ended:
                         future.set_exception(WorkerDiedError(words))
                         break
                 except BaseException as error:

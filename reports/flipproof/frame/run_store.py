@@ -126,8 +126,8 @@ class RunStore(AbstractContextManager["RunStore"]):
         runs = f"{len(self.found)} of {self.asked} runs"
         calls = f"{len(self.found_calls)} of {self.calls} maps and audits" if self.calls else ""
         when = sorted(self.found + self.found_calls)
-        made = f"made {when[0]} UTC" + (f" to {when[-1]} UTC" if when[-1] != when[0] else "") if when else ""
-        return {WORDS: ", ".join(part for part in (runs, calls, made) if part)}
+        dates = f"made {when[0]} UTC" + (f" to {when[-1]} UTC" if when[-1] != when[0] else "") if when else ""
+        return {WORDS: ", ".join(part for part in (runs, calls, dates) if part)}
 
     def whereabouts(self) -> str:
         """Return where the file lies and how large it is, or why there is none."""
@@ -137,25 +137,25 @@ class RunStore(AbstractContextManager["RunStore"]):
         size = sum(file.stat().st_size for file in files if file.is_file())
         return f"{self.place} ({size / 1e6:.0f} MB; runs are made again if it is deleted)"
 
-    def _get(self, key: bytes | None, found: list[str]) -> tuple[Any] | None:
-        """Return what was kept under a key, alone in a tuple, or None; note in ``found`` when it was made."""
+    def _get(self, key: bytes | None, dates: list[str]) -> tuple[Any] | None:
+        """Return what was kept under a key, alone in a tuple, or None; note in ``dates`` when it was made."""
         if key is None:
             return None
         kept = self._use(lambda store: store.get([key]).get(key))
         if kept is None:
             return None
         try:
-            value, made = unpack(kept[1])
+            value, date = unpack(kept[1])
         except Exception:  # written by another program: a class may refuse it in any way
             return None
         self._change(lambda store: store.touch(key))
-        found.append(str(made))
+        dates.append(str(date))
         return (value,)
 
-    def _put(self, key: bytes | None, shared: Mapping[str, Any], asked: object, content: bytes | None) -> None:
+    def _put(self, key: bytes | None, shared: Mapping[str, Any], question: object, content: bytes | None) -> None:
         if key is None or content is None or len(content) > self.limit or not self._same_program():
             return
-        entry = Entry(key, {**shared, "versions": versions_of()}, json.dumps(asked), content)
+        entry = Entry(key, {**shared, "versions": versions_of()}, json.dumps(question), content)
         self._change(lambda store: store.put([entry], dated=True))
         self._change(lambda store: store.evict(self.limit))
 
@@ -238,20 +238,20 @@ class _Remembering(Executor):
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Return the answer as it was kept, or call ``fn`` in a worker and keep it."""
         key = key_of_call(fn, args, kwargs)
-        known = self._store.find_call(key)
+        kept = self._store.find_call(key)
         answer: Future[Any] = Future()
-        if known is not None:
-            answer.set_result(known[0])
+        if kept is not None:
+            answer.set_result(kept[0])
             return answer
         answer.set_running_or_notify_cancel()
 
-        def keep(done: Future[Any]) -> None:
-            error = CancelledError() if done.cancelled() else done.exception()
+        def keep(future: Future[Any]) -> None:
+            error = CancelledError() if future.cancelled() else future.exception()
             if error is not None:
                 answer.set_exception(error)
             else:
-                found, content = done.result()
-                answer.set_result(found)
+                value, content = future.result()
+                answer.set_result(value)
                 self._store.keep_call(key, f"{fn.__module__}.{fn.__qualname__}", content)
 
         self._pool.submit(_timed, fn, args, kwargs, self._store.slow).add_done_callback(keep)

@@ -53,4 +53,4 @@ def fair_shares(names: Collection[str], value: Callable[[tuple[str, ...]], Value
 
 def grouped_shares(groups: Mapping[str, Sequence[str]], value: Callable[[tuple[str, ...]], Value]) -> dict[str, Value]:
     """Return the fair share of every group of names whose changes are made together, as one."""
-    return fair_shares(list(groups), lambda made: value(tuple(chain.from_iterable(groups[name] for name in made))))
+    return fair_shares(list(groups), lambda chosen: value(tuple(chain.from_iterable(groups[name] for name in chosen))))

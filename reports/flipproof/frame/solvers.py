@@ -105,7 +105,7 @@ class Run:
 def _hashable(value: Any) -> Any:
     """Return a value that compares like ``value`` and can be hashed: mappings, lists and arrays become tuples."""
     if isinstance(value, Mapping):
-        return tuple(sorted((name, _hashable(each)) for name, each in value.items()))
+        return tuple(sorted((name, _hashable(element)) for name, element in value.items()))
     if isinstance(value, np.ndarray):
         return value.dtype.str, value.shape, value.tobytes()
     # 1 == 1.0 == True, but a solver may take them for different things.

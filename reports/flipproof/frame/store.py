@@ -184,12 +184,12 @@ class Store(AbstractContextManager["Store"]):
 
     def shared(self) -> list[dict[str, Any]]:
         """Return what entries have in common, each once."""
-        some: list[dict[str, Any]] = []
+        records: list[dict[str, Any]] = []
         with self._lock:
             for (facts,) in self._rows.execute("SELECT facts FROM shared ORDER BY id"):
                 with suppress(ValueError):  # damaged: its entries do not agree with their checksums, and are made again
-                    some.append(json.loads(facts))
-        return [facts for facts in some if isinstance(facts, dict)]
+                    records.append(json.loads(facts))
+        return [facts for facts in records if isinstance(facts, dict)]
 
     def patience(self, seconds: float) -> None:
         """Wait so long for another program that writes, from now on."""
@@ -205,7 +205,7 @@ class Store(AbstractContextManager["Store"]):
 
     def _copy(self, aside: Path) -> int:
         """Copy what is whole in a damaged file, up to the first page that cannot be read; return how much that is."""
-        some: list[Entry] = []
+        entries: list[Entry] = []
         with suppress(*UNUSABLE, ValueError), closing(sqlite3.connect(aside)) as old:
             old.text_factory = bytes
             facts = dict(old.execute("SELECT id, facts FROM shared NOT INDEXED"))
@@ -213,10 +213,10 @@ class Store(AbstractContextManager["Store"]):
             for *row, kind in old.execute(f"SELECT {columns} FROM made NOT INDEXED"):
                 if _whole(facts, *row):
                     key, shared, asked, answer, _ = row
-                    said = answer.decode() if kind == b"text" else answer
-                    some.append(Entry(key, json.loads(facts[shared]), asked.decode(), said))
-        self.put(some)
-        return len(some)
+                    decoded = answer.decode() if kind == b"text" else answer
+                    entries.append(Entry(key, json.loads(facts[shared]), asked.decode(), decoded))
+        self.put(entries)
+        return len(entries)
 
 
 def check_own(path: Path) -> None:

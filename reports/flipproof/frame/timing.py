@@ -90,10 +90,10 @@ def _made_timed(run: Run, times: FloatArray) -> Made:
     spent: list[float] = []
     while len(spent) < 3 and sum(spent) <= 0.01:
         began = time.process_time()
-        made = make(run)
+        result = make(run)
         spent.append(time.process_time() - began)
-    thinned = None if made.trajectory is None else sampled(made.trajectory, times)
-    return replace(made, trajectory=thinned, seconds=min(spent))
+    thinned = None if result.trajectory is None else sampled(result.trajectory, times)
+    return replace(result, trajectory=thinned, seconds=min(spent))
 
 
 def sampled(trajectory: Trajectory, times: FloatArray) -> Trajectory:

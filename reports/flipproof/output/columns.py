@@ -71,11 +71,13 @@ def _cell(value: Any, digits: int | None) -> str:
 def json_ready(value: Any) -> Any:
     """Return a value as JSON holds it: arrays are left out of mappings, what JSON cannot say becomes text."""
     if isinstance(value, Mapping):
-        return {str(name): json_ready(each) for name, each in value.items() if not getattr(each, "shape", None)}
+        return {
+            str(name): json_ready(element) for name, element in value.items() if not getattr(element, "shape", None)
+        }
     if hasattr(value, "item"):
         value = value.item()
     if isinstance(value, (list, tuple)):
-        return [json_ready(each) for each in value]
+        return [json_ready(element) for element in value]
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)

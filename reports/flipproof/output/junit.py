@@ -66,8 +66,8 @@ def _add_case(tests: ElementTree.Element, finding: Finding, suite: str, seconds:
     elif finding.verdict == "not evaluated":
         error = ElementTree.SubElement(case, "error", {"message": _clean(finding.note), "type": "not evaluated"})
         error.text = _clean(f"{finding.title}\n{finding.note}")
-    said = ElementTree.SubElement(case, "system-out")
-    said.text = _clean(f"{finding.title}: {numbers}" + (f"; {finding.note}" if finding.note else ""))
+    output = ElementTree.SubElement(case, "system-out")
+    output.text = _clean(f"{finding.title}: {numbers}" + (f"; {finding.note}" if finding.note else ""))
 
 
 def _numbers(finding: Finding) -> str:

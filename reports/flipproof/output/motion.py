@@ -104,8 +104,10 @@ def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | N
     failed with its reason.
     """
     times = np.linspace(0.0, throw.duration, FRAMES)
-    there = {name: made[name] for name in FLOWN if name in made}
-    shown = {name: flight_of(each.trajectory, times) for name, each in there.items() if each.trajectory is not None}
+    results = {name: made[name] for name in FLOWN if name in made}
+    shown = {
+        name: flight_of(result.trajectory, times) for name, result in results.items() if result.trajectory is not None
+    }
     if not shown:
         return None
     bottle = throw.bottle
@@ -124,7 +126,7 @@ def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | N
         "slow": 9.6,  # the paper's slow motion: 240 pictures per second shown at 25
         "position_step": POSITION_STEP,
         "flights": [_packed(name, flight, bottle.length) for name, flight in shown.items()],
-        "failed": [{"name": name, "reason": each.reason} for name, each in there.items() if name not in shown],
+        "failed": [{"name": name, "reason": result.reason} for name, result in results.items() if name not in shown],
         "table": _table(times, list(shown.values())),
     }
 
@@ -158,8 +160,8 @@ def _table(times: FloatArray, flights: Sequence[Flight]) -> list[dict[str, Any]]
     """Return angle [degrees] and angular velocity [rad/s] of every flight at eleven times; None after its end."""
 
     def at(flight: Flight, k: int) -> dict[str, float] | None:
-        there = k < len(flight.t)
-        return {"theta_deg": float(np.degrees(flight.theta[k])), "omega": float(flight.omega[k])} if there else None
+        reached = k < len(flight.t)
+        return {"theta_deg": float(np.degrees(flight.theta[k])), "omega": float(flight.omega[k])} if reached else None
 
     shown = np.unique(np.rint(np.linspace(0, len(times) - 1, 11)).astype(int)).tolist()
     return [{"t": float(times[k]), "values": [at(flight, k) for flight in flights]} for k in shown]

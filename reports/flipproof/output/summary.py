@@ -32,7 +32,7 @@ def summarise(
     A number that is not finite is one of the words "nan", "inf", "-inf": JSON has no such numbers, and to leave it out
     would hide that something was computed and came to nothing. Raises ValueError if two findings share an id.
     """
-    findings = [finding for each in results.values() for finding in each.findings]
+    findings = [finding for result in results.values() for finding in result.findings]
     ids = Counter(finding.id for finding in findings)
     if len(ids) < len(findings):
         raise ValueError(f"findings share an id: {', '.join(sorted(name for name, n in ids.items() if n > 1))}")
@@ -49,8 +49,8 @@ def summarise(
         "solvers": [],
         "paper": None,
         "work_precision": {},
-        "runs": [_run_mapping(made) for made in gathered.flights.values()],
-        "problems": dict(note for each in results.values() for note in each.notes),
+        "runs": [_run_mapping(flight) for flight in gathered.flights.values()],
+        "problems": dict(note for result in results.values() for note in result.notes),
         "figures": [
             _figure_mapping(exhibit, part.id)
             for part in gathered.parts
@@ -61,9 +61,9 @@ def summarise(
         "stages": {name: round(seconds, 3) for name, seconds in gathered.stages.seconds.items()},
         "provenance": dict(provenance),
     }
-    for each in results.values():
-        if each.found is not None:
-            summary |= each.chapter.summary(each.found)
+    for result in results.values():
+        if result.found is not None:
+            summary |= result.chapter.summary(result.found)
     return {name: json_ready(value) for name, value in summary.items()}
 
 
@@ -72,11 +72,11 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     return json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def _run_mapping(made: Made) -> dict[str, Any]:
-    mapping: dict[str, Any] = {"tag": made.run.name, "solver": made.run.solver, "seconds": round(made.seconds, 4)}
-    if made.trajectory is None:
-        return mapping | {"status": "failed", "message": made.reason}
-    run = made.trajectory
+def _run_mapping(result: Made) -> dict[str, Any]:
+    mapping: dict[str, Any] = {"tag": result.run.name, "solver": result.run.solver, "seconds": round(result.seconds, 4)}
+    if result.trajectory is None:
+        return mapping | {"status": "failed", "message": result.reason}
+    run = result.trajectory
     return mapping | {"status": run.status, "message": run.message, "settings": run.settings}
 
 

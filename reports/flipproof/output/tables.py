@@ -23,8 +23,8 @@ def trajectory_csv(trajectory: Trajectory) -> str:
 
     Slices count from 0. Numbers have 15 significant digits. What a solver did not give is left out.
     """
-    known = ("t", "theta", "omega", "r_cm", "inertia")
-    names = [name for name in known if name not in trajectory.diagnostics.get("not_given", ())]
+    quantities = ("t", "theta", "omega", "r_cm", "inertia")
+    names = [name for name in quantities if name not in trajectory.diagnostics.get("not_given", ())]
     columns = [getattr(trajectory, name) for name in names]
     if len(trajectory.r) == len(trajectory.t):
         slices = range(trajectory.scenario.n_slices)
@@ -68,8 +68,8 @@ def read_curve(path: Path) -> Curve:
     and column of what is missing, not a number, not finite, or goes back in time.
     """
     names, rows = read_cells(path)
-    there = [name for name in QUANTITIES if name in names]
-    if "t" not in names or not there:
+    quantities = [name for name in QUANTITIES if name in names]
+    if "t" not in names or not quantities:
         what = "t" if "t" not in names else f"of {', '.join(QUANTITIES)}"
         raise ValueError(f"{path}: the header has no column {what}; it has {shortened(', '.join(names), 80)}")
     notes: tuple[str, ...] = ()
@@ -77,30 +77,30 @@ def read_curve(path: Path) -> Curve:
     if flight := flight_in(path, names, rows):
         rows, release, notes = flight.rows, flight.release, (flight.words,)
     series: dict[str, tuple[FloatArray, FloatArray]] = {}
-    for name in there:
+    for name in quantities:
         t, values = _series(path, names, rows, name)
         if len(t) >= 2:
             series[name] = t - release, values
     if not series:
-        raise ValueError(f"{path}: has fewer than 2 rows with t and one of {', '.join(there)}")
+        raise ValueError(f"{path}: has fewer than 2 rows with t and one of {', '.join(quantities)}")
     return Curve(str(path), series, notes)
 
 
 def _series(path: Path, names: list[str], rows: Rows, name: str) -> tuple[FloatArray, FloatArray]:
     """Return times and values of the rows in which both cells are filled."""
     places = names.index("t"), names.index(name)
-    found = np.array(
+    samples = np.array(
         [
             (number_of(path, line, "t", cells[places[0]]), number_of(path, line, name, cells[places[1]]), line)
             for line, cells in rows
             if all(cells[place].strip() for place in places)
         ]
     ).reshape(-1, 3)
-    back = np.flatnonzero(np.diff(found[:, 0]) < 0)
+    back = np.flatnonzero(np.diff(samples[:, 0]) < 0)
     if len(back):
-        before, after = found[back[0], 0], found[back[0] + 1, 0]
-        raise ValueError(f"{path}: line {found[back[0] + 1, 2]:.0f}: t = {after:g} s follows t = {before:g} s")
-    return found[:, 0], found[:, 1]
+        before, after = samples[back[0], 0], samples[back[0] + 1, 0]
+        raise ValueError(f"{path}: line {samples[back[0] + 1, 2]:.0f}: t = {after:g} s follows t = {before:g} s")
+    return samples[:, 0], samples[:, 1]
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,11 +42,11 @@ GREEK: Final = {"omega": "ω", "gamma": "γ", "alpha": "α", "theta": "θ", "sum
 def equation(text: str) -> Markup:
     """Return an equation of motion with its formula as MathML; words stay words."""
     # What begins like v' = or r_i'' =, up to a colon or comma; words follow.
-    found = re.match(r"[a-z]\w*'* = [^:,]*", text)
-    if found is None:
+    match = re.match(r"[a-z]\w*'* = [^:,]*", text)
+    if match is None:
         return Markup("{}").format(typeset(text))
-    formula = Markup("").join(_row(found.group()))
-    return Markup("<math>{}</math>{}").format(formula, typeset(text[found.end() :]))
+    formula = Markup("").join(_row(match.group()))
+    return Markup("<math>{}</math>{}").format(formula, typeset(text[match.end() :]))
 
 
 def _row(formula: str) -> Iterator[Markup]:
@@ -64,10 +64,10 @@ def _row(formula: str) -> Iterator[Markup]:
 
 def _symbol(base: str, sub: str | None, primes: str, power: str | None) -> Markup:
     tag = "mo" if base == "sum" else "mi"
-    made = Markup("<{0}>{1}</{0}>").format(tag, GREEK.get(base, base))
+    symbol = Markup("<{0}>{1}</{0}>").format(tag, GREEK.get(base, base))
     if primes:  # derivatives with respect to time
-        made = Markup("<mover>{}<mo>{}</mo></mover>").format(made, "˙" if primes == "'" else "¨")
+        symbol = Markup("<mover>{}<mo>{}</mo></mover>").format(symbol, "˙" if primes == "'" else "¨")
     if sub:
         kind = "mi" if len(sub) == 1 else "mtext"
-        made = Markup("<msub>{0}<{1}>{2}</{1}></msub>").format(made, kind, escape(sub))
-    return made if power is None else Markup("<msup>{}<mn>{}</mn></msup>").format(made, power)
+        symbol = Markup("<msub>{0}<{1}>{2}</{1}></msub>").format(symbol, kind, escape(sub))
+    return symbol if power is None else Markup("<msup>{}<mn>{}</mn></msup>").format(symbol, power)

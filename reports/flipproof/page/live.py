@@ -46,7 +46,7 @@ class Slider:
 
 def sliders(throw: Scenario) -> list[Slider]:
     """Return the sliders of a throw, each wide enough for its value."""
-    asked = (
+    usual = (
         Slider("g", "gravity g", "m/s²", 0.0, 20.0, 0.01, 2, throw.gravity),
         Slider("theta0", "angle of release θ₀", "°", -180.0, 180.0, 1.0, 0, math.degrees(throw.theta0)),
         Slider("fill", "filling", "%", 10.0, 100.0, 1.0, 0, 100.0 * throw.fill_fraction),
@@ -54,7 +54,7 @@ def sliders(throw: Scenario) -> list[Slider]:
         Slider("e", "restitution e", "", 0.0, 0.8, 0.01, 2, throw.restitution),
         Slider("omega0", "spin ω₀", "rad/s", 5.0, 25.0, 0.1, 1, throw.omega0),
     )
-    return [replace(one, low=min(one.low, one.value), high=max(one.high, one.value)) for one in asked]
+    return [replace(slider, low=min(slider.low, slider.value), high=max(slider.high, slider.value)) for slider in usual]
 
 
 def live_data(throw: Scenario) -> dict[str, Any]:
@@ -79,8 +79,8 @@ def touch_data(touch: Touch) -> dict[str, Any]:
     values = {name: np.interp(t, *curve, left=np.nan, right=np.nan) for name, curve in touch.curves.items()}
     if touch.limits is not None:  # logarithms of absolute values, none below a tenth of the axis's end
         least = touch.limits[0] / 10
-        values = {name: np.log10(np.maximum(np.abs(each), least)) for name, each in values.items()}
-    finite = np.concatenate([each[np.isfinite(each)] for each in values.values()])
+        values = {name: np.log10(np.maximum(np.abs(curve), least)) for name, curve in values.items()}
+    finite = np.concatenate([curve[np.isfinite(curve)] for curve in values.values()])
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
     room = 0.04 * (high - low) or 1.0
     y: dict[str, Any] = {"label": touch.label, "digits": touch.digits, "high": high + room}
@@ -98,15 +98,15 @@ def touch_data(touch: Touch) -> dict[str, Any]:
                 "name": name,
                 "words": spoken(name),
                 "off": bool(touch.shown) and name not in touch.shown,
-                "values": _text(each, low, high),
+                "values": _text(curve, low, high),
             }
-            for name, each in values.items()
+            for name, curve in values.items()
         ],
     }
 
 
 def _text(values: FloatArray, low: float, high: float) -> str:
     parts = np.full(len(values), NONE, dtype="<u2")
-    there = np.isfinite(values)
-    parts[there] = np.rint((values[there] - low) / ((high - low) or 1.0) * (NONE - 1))
+    finite = np.isfinite(values)
+    parts[finite] = np.rint((values[finite] - low) / ((high - low) or 1.0) * (NONE - 1))
     return base64.b64encode(parts.tobytes()).decode("ascii")

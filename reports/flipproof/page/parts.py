@@ -91,26 +91,29 @@ class Section:
             "observed": ("observation", "observations"),
             "not evaluated": ("not evaluated", "not evaluated"),
         }
-        there = [(counts[verdict], *said) for verdict, said in words.items() if verdict in counts]
-        return ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in there)
+        counted = [(counts[verdict], *forms) for verdict, forms in words.items() if verdict in counts]
+        return ", ".join(f"{n} {singular if n == 1 else plural}" for n, singular, plural in counted)
 
 
 def sections(gathered: Gathered, results: Mapping[str, ChapterResult], templates: Environment) -> tuple[Section, ...]:
     """Return every part that has a chapter in this report, in order."""
 
     def section(part: Part, chapters: Sequence[ChapterResult]) -> Section:
-        findings = [finding for each in chapters for finding in each.findings]
+        findings = [finding for result in chapters for finding in result.findings]
         return Section(
             id=part.id,
             title=part.title,
             sentence=part.sentence,
-            html=linked("\n".join(_chapter(gathered, each, templates) for each in chapters)),
+            html=linked("\n".join(_chapter(gathered, result, templates) for result in chapters)),
             findings=tuple(sorted(findings, key=lambda finding: finding.kind != "regression")),
-            figure=next((figure.name for each in chapters for figure in each.figures), ""),
+            figure=next((figure.name for result in chapters for figure in result.figures), ""),
         )
 
-    there = ((part, [results[each.name] for each in part.chapters if each.name in results]) for part in gathered.parts)
-    return tuple(section(part, chapters) for part, chapters in there if chapters)
+    contents = (
+        (part, [results[chapter.name] for chapter in part.chapters if chapter.name in results])
+        for part in gathered.parts
+    )
+    return tuple(section(part, chapters) for part, chapters in contents if chapters)
 
 
 def _chapter(gathered: Gathered, result: ChapterResult, templates: Environment) -> Markup:
@@ -149,5 +152,7 @@ def shared(figures: Sequence[Exhibit]) -> tuple[str, tuple[str, ...]]:
     """Return the sentences that three and more captions, and three in four, have; and the captions without them."""
     split = [re.split(r"(?<=[.?!]) (?=[A-Z“])", figure.caption) for figure in figures]
     counts = Counter(sentence for sentences in split for sentence in dict.fromkeys(sentences))
-    common = [each for each, count in counts.items() if count >= max(3, 0.75 * len(figures))]
-    return " ".join(common), tuple(" ".join(each for each in sentences if each not in common) for sentences in split)
+    common = [sentence for sentence, count in counts.items() if count >= max(3, 0.75 * len(figures))]
+    return " ".join(common), tuple(
+        " ".join(sentence for sentence in sentences if sentence not in common) for sentences in split
+    )

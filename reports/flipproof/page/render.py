@@ -74,12 +74,12 @@ def render(
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     verdict = headlines(gathered)
-    findings = [finding for each in results.values() for finding in each.findings]
-    figures = {figure.name: figure for each in results.values() for figure in each.figures}
+    findings = [finding for result in results.values() for finding in result.findings]
+    figures = {figure.name: figure for result in results.values() for figure in result.figures}
     regressions = [finding for finding in findings if finding.kind == "regression"]
     flown = gathered.found("flights")
     facts = story(summary, {name: figure.table for name, figure in figures.items()})
-    asked = sliders(gathered.ask.throw)
+    controls = sliders(gathered.ask.throw)
     context = dict(
         scenario=gathered.ask.scenario,
         throw=gathered.ask.throw,
@@ -89,8 +89,8 @@ def render(
         regressions=regressions,
         failed=[finding for finding in regressions if finding.failed],
         solvers=flown.rows if flown is not None else [],
-        problems=[made for made in gathered.flights.values() if made.trajectory is None],
-        notes=[note for each in results.values() for note in each.notes],
+        problems=[flight for flight in gathered.flights.values() if flight.trajectory is None],
+        notes=[note for result in results.values() for note in result.notes],
         motion=flown.motion if flown is not None else None,
         measured=gathered.found("measured"),
         provenance=provenance,
@@ -99,8 +99,8 @@ def render(
         formulas={term: find(solver).equation for term, solver in EQUATIONS.items()},
         story=facts,
         omega=figures.get("omega"),
-        sliders=asked,
-        slider_of={one.name: one for one in asked},
+        sliders=controls,
+        slider_of={slider.name: slider for slider in controls},
         live=live_data(gathered.ask.throw),
     )
     parts = sections(gathered, results, templates)

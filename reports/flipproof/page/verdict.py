@@ -197,14 +197,14 @@ def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
         return
     steps = by_id["step"].note if "step" in by_id else "the steps"
     also = f", but only {_amount(by_id['whole'])} off free flight" if _nearer_to_free(by_id) else ""
-    asked = {
+    questions = {
         "held": ("May ω be held constant over a step?", "{}, if rebounds keep their own times"),
         "step": (f"Are {steps} enough?", "{} off what shorter steps approach"),
         "program-eq8": ("Does the program solve Eq. 8?", f"{{}} off{also}"),
         "eq8-free": ("Is Eq. 8 free flight?", "{} apart"),
         "engine": ("Does a physics engine agree with free flight?", "{} off, by pymunk"),
     }
-    for id_, (question, words) in asked.items():
+    for id_, (question, words) in questions.items():
         if id_ in by_id:
             headline = by_id[id_]
             until = f" {headline.note}" if headline.note and id_ not in ("held", "step") else ""
@@ -362,7 +362,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
 def _layers(summary: Summary, numbers: Mapping[str, Number | None]) -> list[SimpleNamespace]:
     """Return the three layers of the answer: id, name, question, section of the evidence, and number with verdict."""
     steps = summary.at("headlines/step/note") or "the steps"
-    asked = {
+    questions = {
         "step": ("The time step", "steps", f"Are {steps} enough?"),
         "program-eq8": ("The algebra of Eq. 9", "errata", "Do the program’s formulas, Eq. 9, solve Eq. 8?"),
         "eq8-free": (
@@ -372,7 +372,7 @@ def _layers(summary: Summary, numbers: Mapping[str, Number | None]) -> list[Simp
         ),
     }
     layers = []
-    for id_, (name, section, question) in asked.items():
+    for id_, (name, section, question) in questions.items():
         number = numbers[id_.replace("-", "_")]
         if number is not None:
             beside = {"finer": percent, "finer_slices": plain, "band": small}
@@ -429,7 +429,7 @@ def _nearest(summary: Summary) -> list[SimpleNamespace]:
         )
         for solver in ("rods", "free-flight", "published-python", "column", "eq8")
     ]
-    return sorted(equations, key=lambda one: (-one.agrees.value, -one.nearest.value))
+    return sorted(equations, key=lambda equation: (-equation.agrees.value, -equation.nearest.value))
 
 
 def _map(table: str | None, content: Mapping[str, Any]) -> dict[str, Any] | None:

@@ -157,8 +157,13 @@ HEADER: Final = ("name", "symbol", "value", "unit", "stated in", "in other words
 def parameter_rows() -> list[tuple[str, ...]]:
     """Return one row of words for each parameter, as ``HEADER`` has them; values with up to five digits."""
     return [
-        (each.name, each.symbol, ", ".join(f"{value:.5g}" for value in each.values), *astuple(each)[3:])
-        for each in PARAMETERS.values()
+        (
+            parameter.name,
+            parameter.symbol,
+            ", ".join(f"{value:.5g}" for value in parameter.values),
+            *astuple(parameter)[3:],
+        )
+        for parameter in PARAMETERS.values()
     ]
 
 
@@ -257,18 +262,18 @@ def _families() -> dict[str, tuple[Case, ...]]:
     long_steps = 1 + LONG_THIN * round((paper_steps() - 1) * long / throw.duration / LONG_THIN)
     keys: dict[tuple[Scenario, int, bool], str] = {}
 
-    def case(key: str, value: float, scenario: Scenario, *, steps: int = paper_steps(), **about: Any) -> Case:
+    def case(key: str, value: float, scenario: Scenario, *, steps: int = paper_steps(), **fields: Any) -> Case:
         """Return a case; its key counts unless the throw has one already."""
-        key = keys.setdefault((scenario, steps, about.get("slices_vary", False)), key)
-        return Case(key=key, value=value, scenario=scenario, steps=steps, **about)
+        key = keys.setdefault((scenario, steps, fields.get("slices_vary", False)), key)
+        return Case(key=key, value=value, scenario=scenario, steps=steps, **fields)
 
-    def of(parameter: str, key: str, thrown: Callable[[float], Scenario], **about: Any) -> tuple[Case, ...]:
+    def of(parameter: str, key: str, thrown: Callable[[float], Scenario], **fields: Any) -> tuple[Case, ...]:
         """Return a case for each value; its key is written from the value, and from the value in degrees."""
-        return tuple(case(key.format(v, math.degrees(v)), v, thrown(v), **about) for v in numbers(parameter))
+        return tuple(case(key.format(v, math.degrees(v)), v, thrown(v), **fields) for v in numbers(parameter))
 
     def of_beta(key: str, thrown: Scenario) -> tuple[Case, ...]:
-        beta, about = "figure-5-rebound", {"slices_vary": True, "whole": True}
-        return of(beta, key, lambda value: replace(thrown, restitution=abs(value)), **about)
+        beta, fields = "figure-5-rebound", {"slices_vary": True, "whole": True}
+        return of(beta, key, lambda value: replace(thrown, restitution=abs(value)), **fields)
 
     def of_slices(key: str, cut: Callable[[int], Scenario]) -> tuple[Case, ...]:
         return of("figure-5d-slices", key, lambda count: cut(round(count)), slices_vary=True)

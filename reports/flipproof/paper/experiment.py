@@ -249,8 +249,8 @@ def compare(observation: Observation, flights: CaseFlights) -> Reading:
     low, high = observation.measured
     bounds = (low - observation.slack, high + observation.slack)
 
-    def read(each: CaseFlights) -> Iterator[Reading]:
-        yield Reading(observation.means, observation.read(each), observation.unit, bounds)
+    def read(flown: CaseFlights) -> Iterator[Reading]:
+        yield Reading(observation.means, observation.read(flown), observation.unit, bounds)
 
     judgement = judge_sense(read, flights)
     if judgement.aside:
@@ -262,8 +262,8 @@ def compare(observation: Observation, flights: CaseFlights) -> Reading:
 def compare_all(flights: Sequence[CaseFlights]) -> tuple[Observation, ...]:
     """Return every statement about the experiment with the numbers of all equations."""
     return tuple(
-        replace(each, readings={equation.solver: compare(each, equation) for equation in flights})
-        for each in OBSERVATIONS
+        replace(observation, readings={equation.solver: compare(observation, equation) for equation in flights})
+        for observation in OBSERVATIONS
     )
 
 
@@ -271,11 +271,11 @@ def standing(observations: Sequence[Observation]) -> dict[str, tuple[int, int]]:
     """Return with how many statements each equation agrees, and for how many it is the closest, or one of those."""
     return {
         solver: (
-            sum(each.readings[solver].verdict == "holds" for each in observations),
-            sum(solver in each.closest for each in observations),
+            sum(observation.readings[solver].verdict == "holds" for observation in observations),
+            sum(solver in observation.closest for observation in observations),
         )
         for solver in CONTESTANTS
-        if all(solver in each.readings for each in observations)
+        if all(solver in observation.readings for observation in observations)
     }
 
 

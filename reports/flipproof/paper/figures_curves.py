@@ -183,12 +183,12 @@ def _exhibits_curves(name: str, runs: PaperRuns) -> Iterator[Exhibit]:
     quantity = shown.quantity
     rows = tuple(panels.row_of(quantity.y, partial(_lines, runs, quantity, of), VARIED[of][1]) for of in shown.families)
     count = ("", ", two rows", ", three rows")[len(rows) - 1]
-    told: list[str] = []
+    sentences: list[str] = []
     for of in shown.families:
         words = VARIED[of][2]
-        words = words.capitalize() if told else f"{quantity.said} {words}".rstrip()
-        told.append(f"{words}: {panels.listed(partial(_numbers, runs, quantity, of), quantity.digits)}.")
-    alt = f"Line plots of {quantity.plotted}{count} by three solvers. {' '.join(told)}"
+        words = words.capitalize() if sentences else f"{quantity.said} {words}".rstrip()
+        sentences.append(f"{words}: {panels.listed(partial(_numbers, runs, quantity, of), quantity.digits)}.")
+    alt = f"Line plots of {quantity.plotted}{count} by three solvers. {' '.join(sentences)}"
     grid = Grid(quantity.x, rows, shown.height, legend_columns=shown.legend_columns)
     yield panels.exhibit_grid(name, shown.title, shown.caption, alt, grid)
 
@@ -237,8 +237,8 @@ def _step_words(runs: PaperRuns) -> Iterator[str]:
         *fewer, most = sorted(by_value) or [0.0]
         for steps in fewer:
             run, finest = by_value[steps], by_value[most]
-            there = np.interp(run.t, finest.t, finest.omega)
-            far = float(np.abs(run.omega - there).max()) / run.scenario.omega0
+            reference = np.interp(run.t, finest.t, finest.omega)
+            far = float(np.abs(run.omega - reference).max()) / run.scenario.omega0
             yield f"filling {filling:g} with {steps:g} steps {far:.2g}"
 
 

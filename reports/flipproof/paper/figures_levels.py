@@ -51,7 +51,7 @@ def _points(runs: PaperRuns, label: str, family: str, of: Callable[[Trajectory],
 
 
 def _row(y: Axis, points: Sequence[Points], *extra: Line) -> panels.Row:
-    return panels.row_of(y, lambda solver: (*extra, *(each.line(solver) for each in points)))
+    return panels.row_of(y, lambda solver: (*extra, *(series.line(solver) for series in points)))
 
 
 def _exhibits_7b(runs: PaperRuns) -> Iterator[Exhibit]:

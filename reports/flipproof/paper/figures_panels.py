@@ -161,13 +161,13 @@ def _set_range(axes: Axes, x: Axis, row: Row) -> None:
 
 def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
     """Put one legend below the figure with every label of any panel once."""
-    found: dict[str, Any] = {}
+    handles: dict[str, Any] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    if found:
+            handles.setdefault(label, handle)
+    if handles:
         figure.legend(
-            list(found.values()), list(found), loc="outside lower center", ncols=min(columns, len(found)),
+            list(handles.values()), list(handles), loc="outside lower center", ncols=min(columns, len(handles)),
             handlelength=2.6, columnspacing=1.4,
         )  # fmt: skip
 

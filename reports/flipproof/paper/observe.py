@@ -132,9 +132,9 @@ def distance(run: Trajectory, other: Trajectory, stretch: float = 1.0, delay: fl
     """
     if not math.isfinite(stretch + delay):
         return math.nan
-    there = run.t / run.scenario.duration / stretch - delay
-    both = (there >= 0.0) & (there <= 1.0)
-    curve = np.interp(there[both], other.t / other.scenario.duration, normalised(other))
+    moments = run.t / run.scenario.duration / stretch - delay
+    both = (moments >= 0.0) & (moments <= 1.0)
+    curve = np.interp(moments[both], other.t / other.scenario.duration, normalised(other))
     return float(np.sqrt(np.mean((normalised(run)[both] - curve) ** 2)))
 
 

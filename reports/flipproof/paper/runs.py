@@ -78,7 +78,7 @@ class PaperRuns:
         cls, answers: Flights, calls: Iterable[Call], planned: Iterable[Planned] = (), costs: Iterable[Call] = ()
     ) -> PaperRuns:
         """Return what became of ``group_calls``, of runs that are not grouped, and of ``cost_calls``."""
-        made = {each.name: answers[each.run] for each in planned if not each.grouped}
+        made = {plan.name: answers[plan.run] for plan in planned if not plan.grouped}
         made |= {name: made for call in calls for name, made in answers.answer(call).items()}
         return cls(made=made, costs=tuple(cost for call in costs for cost in answers.answer(call)))
 
@@ -86,7 +86,7 @@ class PaperRuns:
         """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
 
         def of(wanted: Half) -> dict[str, Made]:
-            return {key: each for (by, key, half), each in self.made.items() if by == solver and half == wanted}
+            return {key: result for (by, key, half), result in self.made.items() if by == solver and half == wanted}
 
         usual = of("")
         halved, half_steps = (
@@ -96,18 +96,20 @@ class PaperRuns:
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return the trajectory of a case, or None if it was not planned or failed."""
-        made = self.made.get((solver, key, ""))
-        return None if made is None else made.trajectory
+        result = self.made.get((solver, key, ""))
+        return None if result is None else result.trajectory
 
     def members(self, solver: str, name: str) -> list[tuple[Case, Trajectory]]:
         """Return the cases of a family that this solver has flown, with their trajectories."""
-        found = ((case, self.trajectory(solver, case.key)) for case in family(name))
-        return [(case, run) for case, run in found if run is not None]
+        flown = ((case, self.trajectory(solver, case.key)) for case in family(name))
+        return [(case, run) for case, run in flown if run is not None]
 
     def failures(self) -> list[str]:
         """Return solver, case and reason of every run that gave no trajectory."""
         return [
-            f"{solver}, {key}: {made.reason}" for (solver, key, _), made in self.made.items() if made.trajectory is None
+            f"{solver}, {key}: {result.reason}"
+            for (solver, key, _), result in self.made.items()
+            if result.trajectory is None
         ]
 
 
@@ -142,7 +144,7 @@ def _settings(solver: str, case: Case) -> dict[str, Any]:
 
 def group_calls(planned: Iterable[Planned], words: str) -> list[Call]:
     """Return the calls that make the runs that are grouped, of each group a worker one at a time."""
-    grouped = [each for each in planned if each.grouped]
+    grouped = [plan for plan in planned if plan.grouped]
     # All at once would take a worker gigabytes.
     groups = (grouped[k : k + 12] for k in range(0, len(grouped), 12))
     return [Call(make_group, (group,), f"{words}, {group[-1].name[1]}") for group in groups]
@@ -157,20 +159,20 @@ def cost_calls() -> list[Call]:
 
 def make_group(group: Iterable[Planned]) -> dict[Name, Made]:
     """Make runs one after the other and keep of each what is looked at."""
-    return {each.name: _kept(make(each.run), each) for each in group}
+    return {plan.name: _kept(make(plan.run), plan) for plan in group}
 
 
-def _kept(made: Made, planned: Planned) -> Made:
+def _kept(result: Made, planned: Planned) -> Made:
     """Return a run with what is kept of it: slices at every time are nearly all of its memory."""
-    run = made.trajectory
+    run = result.trajectory
     if run is None:
-        return made
+        return result
     if planned.thin > 1:
         names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
         run = replace(run, **{name: getattr(run, name)[:: planned.thin].copy() for name in names})
     # No figure and no statement looks at velocities of slices.
     none = np.empty((0, run.scenario.n_slices))
-    return replace(made, trajectory=replace(run, v=none, r=run.r if planned.whole else none))
+    return replace(result, trajectory=replace(run, v=none, r=run.r if planned.whole else none))
 
 
 # ---------------------------------------------------------------------- what statements need beside the figures
@@ -185,7 +187,7 @@ SAME_STEPS_KEY: Final = "filling {:g}, exact-step"
 
 def plan_claims() -> list[Planned]:
     """Return the runs of all statements: those that are not grouped, and those of the published program."""
-    published = (each for half in HALVES for each in plan_published(half))
+    published = (plan for half in HALVES for plan in plan_published(half))
     return [*plan_halved(), *plan_further(), *plan_contest(), *published]
 
 

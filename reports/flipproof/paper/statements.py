@@ -205,9 +205,9 @@ class Judgement:
 
         A statement fails by any reading that is clearly off, and holds only as clearly as its most marginal one.
         """
-        found = [reading for reading in self.readings if reading.verdict == self.verdict]
+        readings = [reading for reading in self.readings if reading.verdict == self.verdict]
         wanted = self.verdict == "holds"
-        return next((reading for reading in found if reading.marginal == wanted), found[0] if found else None)
+        return next((reading for reading in readings if reading.marginal == wanted), readings[0] if readings else None)
 
     @property
     def words(self) -> str:
@@ -347,11 +347,11 @@ def judge_sense(read: Read, flights: CaseFlights) -> Judgement:
     own = BANDS.get(flights.solver, 0.0)
     readings = []
     try:
-        found = tuple(read(flights))
-        coarser = [tuple(read(each)) for each in (flights.halved, flights.half_steps) if each is not None]
+        usual = tuple(read(flights))
+        coarser = [tuple(read(coarse)) for coarse in (flights.halved, flights.half_steps) if coarse is not None]
     except Missing as reason:
         return Judgement(solver=flights.solver, aside=str(reason))
-    for k, reading in enumerate(found):
+    for k, reading in enumerate(usual):
         moved = sum(abs(reading.value - others[k].value) for others in coarser)
         readings.append(replace(reading, band=reading.band + (own if reading.unit == OMEGA else 0.0) + moved))
     return Judgement(solver=flights.solver, readings=tuple(readings), flown=flights.flown)

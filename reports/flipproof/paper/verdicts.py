@@ -36,10 +36,10 @@ SHOWN: Final = (*SOLVERS, *WATERS)
 """Contestants with a column of their own; the rungs in between are counted."""
 
 CLAIMS: Final = tuple(
-    each
+    value
     for module in (claims_figure_5, claims_figures_6_7, claims_figures_8_9)
-    for each in vars(module).values()
-    if isinstance(each, Statement)
+    for value in vars(module).values()
+    if isinstance(value, Statement)
 )
 """All statements, in the order of the paper: that in which they are written down."""
 
@@ -71,7 +71,9 @@ class PaperVerdicts:
         return " ".join(map(self._lead_of, SOLVERS))
 
     def _lead_of(self, solver: str) -> str:
-        judged = [(each.kind, by) for each in self.statements for by in each.judgements if by.solver == solver]
+        judged = [
+            (statement.kind, by) for statement in self.statements for by in statement.judgements if by.solver == solver
+        ]
         claims = [by for kind, by in judged if kind == "claim"]
         limits = [by for kind, by in judged if kind == "admitted limit"]
         of = Counter(judgement.verdict for judgement in claims)
@@ -90,9 +92,9 @@ class PaperVerdicts:
         score = standing(self.comparisons)
         counted = "; ".join(
             f"{CONTEST[solver]} agrees with {agrees} and is the closest, or level with it, for {nearest}"
-            for solver, (agrees, nearest) in sorted(score.items(), key=lambda each: each[1], reverse=True)
+            for solver, (agrees, nearest) in sorted(score.items(), key=lambda row: row[1], reverse=True)
         )
-        total, telling = len(self.comparisons), sum(each.discriminates for each in self.comparisons)
+        total, telling = len(self.comparisons), sum(comparison.discriminates for comparison in self.comparisons)
         return (
             f"Closest to the experiment as the text tells it, of {len(score)}: {best}. Of {total} statements {telling} "
             f"tell equations apart; with each of the other {total - telling} all agree, or none. Of all {total}, "
@@ -129,8 +131,10 @@ def judge_all(flights: list[CaseFlights]) -> tuple[Statement, ...]:
     """Return every statement with its judgements, in the order of the paper."""
     geometry = [CaseFlights(solver="geometry", made={})]
     return tuple(
-        replace(each, judgements=tuple(judge(each, by) for by in (geometry if each.of_geometry else flights)))
-        for each in CLAIMS
+        replace(
+            statement, judgements=tuple(judge(statement, by) for by in (geometry if statement.of_geometry else flights))
+        )
+        for statement in CLAIMS
     )
 
 

@@ -141,13 +141,13 @@ def study(ask: Ask) -> Study[Mapping[str, Agreement]]:
             **{name: ask.solvers[name] for name in (*engines, *solving(ask, equation)) if name in ask.solvers},
         }
         coarser[equation] = Run(equation, ask.throw, coarse, f"{equation}, {SOLVE_IVP}, coarser")
-    every = [run for each in runs.values() for run in each.values()]
+    every = [run for group in runs.values() for run in group.values()]
     every += [run for guest in ask.guests.values() for run in guest.efforts(ask.throw)]
-    calls = {name: omega_band_call(each[name]) for name, each in runs.items()}
+    calls = {name: omega_band_call(group[name]) for name, group in runs.items()}
     flights = yield [*every, *coarser.values(), *calls.values()]
     guests = {label: guest.band(ask.throw, flights) for label, guest in ask.guests.items()}
     bands = {label: band for label, band in guests.items() if band is not None}
-    return {name: agreement_on(name, each, coarser[name], calls[name], flights, bands) for name, each in runs.items()}
+    return {name: agreement_on(name, group, coarser[name], calls[name], flights, bands) for name, group in runs.items()}
 
 
 def solving(ask: Ask, equation: str) -> list[str]:
@@ -167,19 +167,23 @@ def agreement_on(
 
     ``guests`` are the bands of guests, by their names.
     """
-    made = {name: run for name, run in flights.trajectories(runs).items() if run.ok}
+    trajectories = {name: run for name, run in flights.trajectories(runs).items() if run.ok}
     bands: dict[str, FloatArray] = {
-        name: run.diagnostics["omega_band"] for name, run in made.items() if "omega_band" in run.diagnostics
+        name: run.diagnostics["omega_band"] for name, run in trajectories.items() if "omega_band" in run.diagnostics
     }
-    if equation in made:
+    if equation in trajectories:
         bands[equation] = flights.answer(own_band)
     witness = attempt(band_over_time, runs[SOLVE_IVP], coarser, flights)
-    if SOLVE_IVP in made and witness.found is not None:
+    if SOLVE_IVP in trajectories and witness.found is not None:
         bands[SOLVE_IVP] = witness.found
-    certificates = [made[name].diagnostics["certificate"] for name in bands if name not in (equation, SOLVE_IVP)]
+    certificates = [
+        trajectories[name].diagnostics["certificate"] for name in bands if name not in (equation, SOLVE_IVP)
+    ]
     bands |= {name: np.asarray(band) for name, band in guests.items()}
-    until = min((each["horizon"] for each in certificates if each["horizon"] is not None), default=np.inf)
-    return study_agreement({name: run for name, run in made.items() if name in bands}, bands, until=until)
+    until = min(
+        (certificate["horizon"] for certificate in certificates if certificate["horizon"] is not None), default=np.inf
+    )
+    return study_agreement({name: run for name, run in trajectories.items() if name in bands}, bands, until=until)
 
 
 def band_over_time(run: Run, other: Run, flights: Flights) -> FloatArray:

@@ -127,13 +127,13 @@ def study(ask: Ask) -> Study[Differences]:
             finer=(refined[first], refined[second]) if {first, second} <= set(refined) else None,
         )
 
-    tried = {pair: attempt(compared, *pair) for pair in pairs if set(pair[1:]) <= set(runs)}
-    made = tuple(known(tried).values())
+    outcomes = {pair: attempt(compared, *pair) for pair in pairs if set(pair[1:]) <= set(runs)}
+    differences = tuple(known(outcomes).values())
     free, ended = flown.get(FREE), ""
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
-    missing = {pair: outcome.reason for pair, outcome in tried.items() if outcome.reason}
-    return Differences(made, ended, missing, guests)
+    missing = {pair: outcome.reason for pair, outcome in outcomes.items() if outcome.reason}
+    return Differences(differences, ended, missing, guests)
 
 
 def guest_pairs(ask: Ask, flown: Mapping[str, Trajectory]) -> Iterator[tuple[str, str, str]]:
@@ -160,7 +160,9 @@ def run_bands(runs: Mapping[str, Run], calls: Mapping[str, Call], flights: Fligh
         bands[model] = float(result[-1])
     flown = flights.trajectories(runs)
     certified = {name: flown[name].diagnostics.get("certificate", {}) for name in WITNESSES if name in flown}
-    return bands | {name: each["band"] for name, each in certified.items() if each.get("band") is not None}
+    return bands | {
+        name: certificate["band"] for name, certificate in certified.items() if certificate.get("band") is not None
+    }
 
 
 def claims(results: Differences) -> Claims:

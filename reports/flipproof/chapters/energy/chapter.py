@@ -38,14 +38,19 @@ def claims(results: Energy) -> Claims:
         missed = abs(float(ledger["residual"]) / float(ledger["initial"]))
         return regression(id_, title, missed, "of the initial energy", (0.0, 1e-9))
 
-    for model, made in results.checks.items():
+    for model, result in results.checks.items():
         id_, title = f"energy-{model}", f"{model}: the energy ledger closes"
-        yield judged(closes, id_, title, made, id=id_, title=title)
-    for model, each in results.ledgers.items():
-        if each.found is None:
-            yield Absent(f"ledger-{model}", f"ledger of {model}", each.reason, "observation")
+        yield judged(closes, id_, title, result, id=id_, title=title)
+    for model, outcome in results.ledgers.items():
+        if outcome.found is None:
+            yield Absent(f"ledger-{model}", f"ledger of {model}", outcome.reason, "observation")
 
 
 CHAPTER: Final = Chapter(
-    "energy", "Where the energy goes", study, claims, kind="regression", page=lambda it: {"made": known(it.ledgers)}
+    "energy",
+    "Where the energy goes",
+    study,
+    claims,
+    kind="regression",
+    page=lambda results: {"made": known(results.ledgers)},
 )

@@ -87,16 +87,16 @@ def plan_engine_facts(throw: Scenario) -> dict[str, Run]:
     return {words: Run("pymunk", throws[words], usual | changes[words], f"engine fact, {words}") for words in changes}
 
 
-def _gravity(made: Mapping[str, Made]) -> tuple[float, str]:
-    usual, without = made["usual"].whole, made["no gravity"].whole
+def _gravity(results: Mapping[str, Made]) -> tuple[float, str]:
+    usual, without = results["usual"].whole, results["no gravity"].whole
     fallen = 0.5 * usual.scenario.gravity * float(usual.t[-1]) ** 2
     return largest_change(usual, without), f"the bottle falls by {fallen:.2f} m meanwhile"
 
 
-def _smaller_step(made: Mapping[str, Made]) -> tuple[float, str]:
+def _smaller_step(results: Mapping[str, Made]) -> tuple[float, str]:
     held = []
     for dt in (LONG_DT, SHORT_DT):
-        run = made[f"few iterations, dt {dt:g} s"].flight
+        run = results[f"few iterations, dt {dt:g} s"].flight
         if run.ok:
             raise Missing(f"with {FEW_ITERATIONS} iterations and dt = {dt:g} s nothing explodes")
         held.append(float(run.t[-1]))
@@ -105,26 +105,26 @@ def _smaller_step(made: Mapping[str, Made]) -> tuple[float, str]:
     return (short / long if long else math.nan), note
 
 
-def _widest(made: Mapping[str, Made], iterations: int) -> float:
+def _widest(results: Mapping[str, Made], iterations: int) -> float:
     """Return the largest change of omega by another order."""
-    usual, *others = (made[f"order {seed}, {iterations} iterations"].whole for seed in (0, *SHUFFLES))
+    usual, *others = (results[f"order {seed}, {iterations} iterations"].whole for seed in (0, *SHUFFLES))
     return max(largest_change(usual, other) for other in others)
 
 
-def _order(made: Mapping[str, Made]) -> tuple[float, str]:
-    again = largest_change(made["usual"].whole, made[f"order 0, {MANY} iterations"].whole)
-    return _widest(made, FEW), f"{len(SHUFFLES)} shuffled orders; the same order twice: {again:.1g}"
+def _order(results: Mapping[str, Made]) -> tuple[float, str]:
+    again = largest_change(results["usual"].whole, results[f"order 0, {MANY} iterations"].whole)
+    return _widest(results, FEW), f"{len(SHUFFLES)} shuffled orders; the same order twice: {again:.1g}"
 
 
-def _order_forgotten(made: Mapping[str, Made]) -> tuple[float, str]:
-    few, many = _widest(made, FEW), _widest(made, MANY)
+def _order_forgotten(results: Mapping[str, Made]) -> tuple[float, str]:
+    few, many = _widest(results, FEW), _widest(results, MANY)
     note = f"{few:.1e} to {many:.1e} of ω₀: what the order moves is what the solver has not iterated away"
     return many / few, note
 
 
-def _joints(made: Mapping[str, Made]) -> tuple[float, str]:
-    default = made["joints corrected as by default"].whole.diagnostics["constraint_drift"]
-    ours = made["usual"].whole.diagnostics["constraint_drift"]
+def _joints(results: Mapping[str, Made]) -> tuple[float, str]:
+    default = results["joints corrected as by default"].whole.diagnostics["constraint_drift"]
+    ours = results["usual"].whole.diagnostics["constraint_drift"]
     return float(default), f"{ours:.1e} with errors removed within one step"
 
 
@@ -317,10 +317,10 @@ def study(ask: Ask) -> Study[EngineFacts]:
         for throw in (ask.reference, without_gravity(ask.reference))
     ]
     flights = yield [*runs.values(), *both]
-    made = {words: flights[run] for words, run in runs.items()}
+    results = {words: flights[run] for words, run in runs.items()}
     title = f"{ENGINE}: free flight is the same with g = 0"
     gravity = judged(claim_gravity_cancels, *(flights[run] for run in both), id="engine-gravity", title=title)
-    return gravity, tuple(fact.finding(made) for fact in FACTS)
+    return gravity, tuple(fact.finding(results) for fact in FACTS)
 
 
 def claims(results: EngineFacts) -> Claims:

@@ -208,8 +208,8 @@ def erratum_gravity(throw: Scenario) -> Erratum:
     early = replace(throw.with_slices(min(10, throw.n_slices)), duration=min(throw.duration, 0.15))
     change = {}
     for model in ("eq8", "free-flight"):
-        here, far = (solve(model, replace(early, gravity=g)) for g in (throw.gravity, 0.0))
-        change[model] = largest_change(here, far)
+        usual, weightless = (solve(model, replace(early, gravity=g)) for g in (throw.gravity, 0.0))
+        change[model] = largest_change(usual, weightless)
     return Erratum(
         place="Eq. 6, 8",
         prints="m g cos θ in the frame of C_M",

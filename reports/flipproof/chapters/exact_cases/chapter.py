@@ -38,8 +38,8 @@ def errors_of(model: str) -> dict[str, float]:
 
 def claims(results: Results) -> Claims:
     """Yield the largest error of every model."""
-    for model, each in results.items():
-        yield judged(claim_exact_cases, model, each, id=f"exact-cases-{model}", title=f"exact cases of {model}")
+    for model, outcome in results.items():
+        yield judged(claim_exact_cases, model, outcome, id=f"exact-cases-{model}", title=f"exact cases of {model}")
 
 
 def claim_exact_cases(model: str, errors: Mapping[str, float]) -> Finding:

@@ -50,13 +50,13 @@ class Flown(NamedTuple):
     def tables(self) -> dict[str, str]:
         """The file of the trajectory of every solver that flew, by its name."""
         names = {name: f"guest-{guest.slug}" for name, guest in self.guests.items()}
-        flown = [name for name, made in self.made.items() if made.trajectory is not None]
+        flown = [name for name, result in self.made.items() if result.trajectory is not None]
         return {name: f"trajectories/{names.get(name, name)}/data.csv" for name in flown}
 
     @property
     def rows(self) -> list[dict[str, Any]]:
         """What a report says of every solver: status, end, plateau, impacts, diagnostics."""
-        return [solver_row(name, made) for name, made in self.made.items()]
+        return [solver_row(name, result) for name, result in self.made.items()]
 
     @property
     def motion(self) -> dict[str, Any] | None:

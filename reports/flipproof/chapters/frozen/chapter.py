@@ -229,7 +229,7 @@ def envelope(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray,
     windows = np.array_split(np.arange(len(t)), min(100, len(t)))
     shown = _shown(values)
     kept = [shown[window][np.isfinite(shown[window])] for window in windows]
-    least, most = (np.array([pick(each) if len(each) else np.nan for each in kept]) for pick in (np.min, np.max))
+    least, most = (np.array([pick(finite) if len(finite) else np.nan for finite in kept]) for pick in (np.min, np.max))
     return np.array([t[window].mean() for window in windows]), least, most
 
 

@@ -75,9 +75,9 @@ def figures(found: Sequence[Visit]) -> Iterator[Exhibit]:
 
 def _draw_convergence(visits: Sequence[Visit]) -> Exhibit:
     rows = [
-        (visit.guest.slug, visit.equation, repr(one.effort), f"{one.seconds:.4g}", one.error)
+        (visit.guest.slug, visit.equation, repr(effort.effort), f"{effort.seconds:.4g}", effort.error)
         for visit in visits
-        for one in visit.refined
+        for effort in visit.refined
     ]
     words = [f"{v.guest.label}: {v.refined[0].error:.2g} to {v.refined[-1].error:.2g} of omega_0" for v in visits]
     return Exhibit(
@@ -98,10 +98,10 @@ def figure_convergence(visits: Sequence[Visit]) -> Figure:
     """Error against effort."""
     figure, axes = new_figure(size=(8.0, 4.2))
     for k, visit in enumerate(visits):
-        efforts = np.array([one.effort for one in visit.refined])
+        efforts = np.array([effort.effort for effort in visit.refined])
         counted = visit.guest.traits is not None and visit.guest.traits.refined_by == "steps"
         work = efforts / efforts[0] if counted else efforts[0] / efforts
-        errors = np.maximum([one.error for one in visit.refined], FLOOR)
+        errors = np.maximum([effort.error for effort in visit.refined], FLOOR)
         look = {"marker": MARKERS[k % len(MARKERS)], "color": ASSUMPTIONS[k % len(ASSUMPTIONS)]}
         axes.loglog(work, errors, label=f"{visit.guest.label} → {visit.equation}", **look)
     axes.set(xlabel="effort relative to the coarsest run [1]", ylabel="max |ω − ω of the equation| / ω₀ [1]")
@@ -132,7 +132,8 @@ def summarise(visit: Visit) -> dict[str, Any]:
         "problems": visit.problems,
         "band": visit.band,
         "efforts": [
-            {"effort": one.effort, "seconds": round(one.seconds, 4), "error": one.error} for one in visit.refined
+            {"effort": effort.effort, "seconds": round(effort.seconds, 4), "error": effort.error}
+            for effort in visit.refined
         ],
         "waterfall": split,
         "energy_rise": visit.rise,
@@ -147,5 +148,5 @@ CHAPTER: Final = Chapter(
     kind="regression",
     figures=figures,
     work={},
-    summary=lambda found: {"guests": [summarise(visit) for visit in found]},
+    summary=lambda visits: {"guests": [summarise(visit) for visit in visits]},
 )

@@ -105,7 +105,7 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
     for guest in ask.work:
         flight = flights.trajectory(flown[guest]) if guest in flown else None
         equation = guest.equation(rungs, flight)
-        made = guest.efforts(ask.throw)
+        runs = guest.efforts(ask.throw)
         certificate: Outcome[Certificate] = Outcome(None, "a curve in a file cannot be asked")
         if guest in calls:
             certificate = attempt(flights.answer, calls[guest])
@@ -115,7 +115,7 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
                 certificate=certificate,
                 equation=equation,
                 band=guest.band(ask.throw, flights),
-                efforts={run.name: attempt(effort_of, run, rungs.get(equation), flights) for run in made},
+                efforts={run.name: attempt(effort_of, run, rungs.get(equation), flights) for run in runs},
                 rise=rise_of(flight) if flight is not None and len(flight.v) == len(flight.t) else None,
                 waterfall=Outcome(None, "" if flight is None else "what it declares is no equation of the ladder"),
                 placed=placed_on(guest, certificate.found, rungs, flight),
@@ -162,11 +162,11 @@ def certified(spec: str, timeout: float | None) -> Certificate:
 
 def effort_of(run: Run, reference: Trajectory | None, flights: Flights) -> Effort:
     """Return what one effort costs and how far it is from the guest's equation."""
-    made = flights[run].flight
-    if reference is None or len(reference.t[::SPARSE]) != len(made.t):
+    flight = flights[run].flight
+    if reference is None or len(reference.t[::SPARSE]) != len(flight.t):
         raise Missing(f"{run.name}: there is no equation at its times to hold it against")
-    error = float(np.max(np.abs(reference.omega[::SPARSE] - made.omega)) / abs(made.scenario.omega0))
-    return Effort(effort=made.settings["effort"], seconds=made.diagnostics["seconds"], error=error)
+    error = float(np.max(np.abs(reference.omega[::SPARSE] - flight.omega)) / abs(flight.scenario.omega0))
+    return Effort(effort=flight.settings["effort"], seconds=flight.diagnostics["seconds"], error=error)
 
 
 def rise_of(run: Trajectory) -> float:
@@ -213,17 +213,17 @@ def mended(start: Switches, names: Iterable[str]) -> Switches:
 
 def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
     """Return the runs that the splits need."""
-    asked: dict[Run, None] = {}
+    runs: dict[Run, None] = {}
 
     def ask(start: Switches, names: Sequence[str]) -> float:
-        asked[equation_run(throw, mended(start, names))] = None
+        runs[equation_run(throw, mended(start, names))] = None
         return 0.0
 
     for start in starts:
         bars_of(differing(start), lambda names, start=start: ask(start, names), lambda _: 0.0)  # type: ignore[misc]
         ask(start, ())
-        asked[rods_run(throw)] = None
-    return list(asked)
+        runs[rods_run(throw)] = None
+    return list(runs)
 
 
 def split(visit: Visit, throw: Scenario, start: Switches, flights: Flights) -> Waterfall:

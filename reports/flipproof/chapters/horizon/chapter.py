@@ -166,15 +166,15 @@ def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
 
 def study_horizon(solver: str, own: bool, levels: Sequence[Level], flights: Flights) -> Horizon:
     """Read the ensembles of a solver; one that could not be run, as an engine that is not installed, has none."""
-    tried = [
+    outcomes = [
         (level, attempt(lambda runs: Ensemble.of([flights[run].flight for run in runs], BAND), level.runs))
         for level in levels
     ]
     return Horizon(
         solver=solver,
         own=own,
-        ensembles=tuple((level, outcome.found) for level, outcome in tried if outcome.found is not None),
-        problems=tuple(dict.fromkeys(outcome.reason for _, outcome in tried if outcome.reason)),
+        ensembles=tuple((level, outcome.found) for level, outcome in outcomes if outcome.found is not None),
+        problems=tuple(dict.fromkeys(outcome.reason for _, outcome in outcomes if outcome.reason)),
     )
 
 
@@ -231,10 +231,10 @@ def claim_amplification(study: Horizon) -> Finding:
 
 def figures(results: tuple[Horizon, ...]) -> Iterator[Exhibit]:
     """Yield the widths of the ensembles over time."""
-    made = [study for study in results if study.ensembles]
-    if not made:
+    studies = [study for study in results if study.ensembles]
+    if not studies:
         return
-    widest = [(study, both) for study in made for kind in get_args(Kind) if (both := study.widest(kind)) is not None]
+    widest = [(study, both) for study in studies for kind in get_args(Kind) if (both := study.widest(kind)) is not None]
     words = [f"{study.name}: {words_of(*both)}" for study, both in widest]
     words += [f"{study.name} was not run" for study in results if not study.ensembles]
     yield Exhibit(
@@ -248,11 +248,11 @@ def figures(results: tuple[Horizon, ...]) -> Iterator[Exhibit]:
         alt="Logarithmic plots of the width of ensembles over time. "
         + ". ".join(words).replace("ω₀", "omega_0").replace("θ₀", "theta_0"),
         maker=figure_horizon,
-        data=(made,),
+        data=(studies,),
         table=curves_csv(
             {
                 f"width of omega/omega_0 {study.name}, {level.what} [1]": (ensemble.t, ensemble.width)
-                for study in made
+                for study in studies
                 for level, ensemble in study.ensembles
             }
         ),

@@ -90,15 +90,15 @@ def measure(label: str, run: Trajectory) -> Drift:
 
 def claims(results: Ice) -> Claims:
     """Yield that every solver keeps omega, and that welded masses drift at the engine's printed order."""
-    for label, made in results.rigid.items():
+    for label, result in results.rigid.items():
         id_, title = f"ice-{label.replace(' ', '-')}", f"ice: {label} keeps ω constant"
-        yield judged(claim_ice, id_, title, made, id=id_, title=title)
+        yield judged(claim_ice, id_, title, result, id=id_, title=title)
     if results.welded:
         title = "drift of welded ice"
         yield judged(claim_welded_order, *results.welded.values(), id="ice-welded-order", title=title)
-    for label, made in results.guests.items():
+    for label, result in results.guests.items():
         id_, title = f"guest-{results.slugs[label]}-ice", f"{label}: drift of ω in ice on this throw"
-        yield judged(observe_ice, id_, title, made, id=id_, title=title)
+        yield judged(observe_ice, id_, title, result, id=id_, title=title)
 
 
 def observe_ice(id_: str, title: str, run: Trajectory) -> Finding:
@@ -125,7 +125,7 @@ def claim_welded_order(*runs: Trajectory) -> Finding:
 def figures(results: Ice) -> Iterator[Exhibit]:
     """Yield the drifts over time."""
     runs = {**results.rigid, **results.welded, **results.guests}
-    drifts = [measure(label, made.flight) for label, made in runs.items() if made.trajectory is not None]
+    drifts = [measure(label, result.flight) for label, result in runs.items() if result.trajectory is not None]
     if not drifts:
         return
     words = ", ".join(f"{ice.label} {ice.largest:.2g}" for ice in drifts)
@@ -153,8 +153,8 @@ def draw(drifts: Sequence[Drift]) -> Figure:
         floor = least * 3.0**exact
         exact += ice.largest == 0.0
         words = f"{ice.label}: {'none' if ice.largest == 0.0 else f'{ice.largest:.1e}'}"
-        known = STYLES.get(ENGINE if ice.label == f"{ENGINE} rigid" else ice.label)
-        colour = known["color"] if known else next(others)
+        style = STYLES.get(ENGINE if ice.label == f"{ENGINE} rigid" else ice.label)
+        colour = style["color"] if style else next(others)
         axes.semilogy(ice.t, np.maximum(ice.drift, floor), color=colour, linewidth=1.5, label=words)
     axes.set_ylim(least / 3, 1e-2)
     axes.set(xlabel="time t [s]", ylabel=f"|ω / ω₀ − 1| [1], zero drawn below {1000 * least:.0e}")

@@ -41,7 +41,7 @@ def study(ask: Ask) -> Study[LandingStudy]:
 
 def made(wave: str, cases: Cases, seed: int) -> Generator[list[Call], Flights, list[list[Landed]]]:
     """Ask workers for the throws of some cases, and return their rows, case by case."""
-    calls = [Call(make_cases, (some, seed), f"landing, {wave}") for some in chunks(tuple(cases.values()))]
+    calls = [Call(make_cases, (chunk, seed), f"landing, {wave}") for chunk in chunks(tuple(cases.values()))]
     flights = yield calls
     return [rows for call in calls for rows in flights.answer(call)]
 
@@ -54,7 +54,7 @@ def chunks(cases: Sequence[Case]) -> list[tuple[Case, ...]]:
     """
     starts = accumulate((case.throws for case in cases), initial=0)
     groups = groupby(zip(cases, starts, strict=False), key=lambda pair: pair[1] // 300)
-    return [tuple(case for case, _ in some) for _, some in groups]
+    return [tuple(case for case, _ in group) for _, group in groups]
 
 
 def claims(results: LandingStudy) -> Iterator[Finding]:
@@ -109,13 +109,13 @@ def _best_filling(results: LandingStudy) -> Finding:
 def _static(results: LandingStudy) -> Iterator[Finding]:
     """Yield how often the static criterion says the outcome rightly (section 6, Eq. 13a)."""
     title = "Share of throws whose outcome the toppling angle at the touch predicts correctly: "
-    for (family, kind), (said, others) in results.static.items():
-        if throws := said.throws + others.throws:
+    for (family, kind), (below, above) in results.static.items():
+        if throws := below.throws + above.throws:
             id_ = f"landing-static-{family}-{kind.replace(', ', '-')}"
             words = f"{title}{KINDS[kind].words}, family {family}"
-            note = f"of those with a tilt below it {said.upright} of {said.throws} stand, of those above it "
-            note += f"{others.upright} of {others.throws}; {results.assumed}"
-            yield observed(id_, words, (said.upright + others.throws - others.upright) / throws, note=note)
+            note = f"of those with a tilt below it {below.upright} of {below.throws} stand, of those above it "
+            note += f"{above.upright} of {above.throws}; {results.assumed}"
+            yield observed(id_, words, (below.upright + above.throws - above.upright) / throws, note=note)
 
 
 def _bounces(results: LandingStudy) -> Finding:
@@ -135,10 +135,10 @@ def _model_uncertainty(results: LandingStudy) -> Finding:
     """Return how far the laws of the impact are apart: a band of the model, not of the sample."""
     name, title = "landing-laws", "Largest distance in P(upright) between two laws of the impact, water"
     pairs = [
-        (one.minus(other), f"at filling {filling:g}, {KINDS[first].words} minus {KINDS[second].words}")
+        (cell.minus(other), f"at filling {filling:g}, {KINDS[first].words} minus {KINDS[second].words}")
         for filling in results.size.fillings
         for first, second in itertools.permutations(WATER, 2)
-        if (one := results.cell(first, filling)) and (other := results.cell(second, filling))
+        if (cell := results.cell(first, filling)) and (other := results.cell(second, filling))
     ]
     if not pairs:
         return observed(name, title, None, note="one law only")
@@ -166,15 +166,15 @@ def _undecided(results: LandingStudy) -> Finding:
 def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield in how many touches two programs of one law differ, rods and ice."""
     for case, matrix in [(each, matrix) for each in stored["cases"] for matrix in each["matrices"]]:
-        (one, other), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
+        (program, other), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
         kind = "ice" if case["law"] is None else f"water-{case['law']}"
         most = 0.03
-        title = f"Share of touches from which {one} and {other} differ in outcome: {kind.replace('-', ', ')}"
+        title = f"Share of touches from which {program} and {other} differ in outcome: {kind.replace('-', ', ')}"
         note = f"{differ} of {both} that both decide; at most {most:.0%} is required: "
         share = differ / both if both else None
         reached = share is not None and share <= most
         note += f"{'reached' if reached else 'missed'}; stored, made by: {stored['command']}"
-        yield regression(f"landing-witnesses-{kind}-{one}-{other}", title, share, "", (0.0, most), note)
+        yield regression(f"landing-witnesses-{kind}-{program}-{other}", title, share, "", (0.0, most), note)
 
 
 def _judged(

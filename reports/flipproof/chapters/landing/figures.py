@@ -66,8 +66,8 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             "flight's duration. On the lines the bottle touches at 360 and at 720 degrees. Bottle and water strike "
             "the table together.",
             ", ".join(
-                f"{kind}: {int((each.outcome == 'upright').sum())} of {each.outcome.size} cells upright"
-                for kind, each in results.maps.items()
+                f"{kind}: {int((outcomes.outcome == 'upright').sum())} of {outcomes.outcome.size} cells upright"
+                for kind, outcomes in results.maps.items()
             ),
             figure_map,
             map_csv(results),
@@ -92,9 +92,9 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             "down at rest would end upright. Each bar is the share of throws that do end upright, at all fillings: "
             "of those that the angle calls upright, and of the others.",
             "; ".join(
-                f"family {family}, {kind}: {said.upright} of {said.throws} called upright stand, {others.upright} of "
-                f"{others.throws} others"
-                for (family, kind), (said, others) in results.static.items()
+                f"family {family}, {kind}: {below.upright} of {below.throws} called upright stand, {above.upright} of "
+                f"{above.throws} others"
+                for (family, kind), (below, above) in results.static.items()
             ),
             figure_static,
             static_csv(results),
@@ -128,8 +128,8 @@ def _witness_figure(stored: Mapping[str, Any]) -> Exhibit:
     for case in stored["cases"]:
         kind = "ice" if case["law"] is None else f"water, {case['slices']}, {case['law']}"
         for matrix in case["matrices"]:
-            one, other = matrix["programs"]
-            words.append(f"{kind}, {one} and {other}: {matrix['differ']} of {matrix['decided by both']} differ")
+            program, other = matrix["programs"]
+            words.append(f"{kind}, {program} and {other}: {matrix['differ']} of {matrix['decided by both']} differ")
     return Exhibit(
         name="landing-witnesses",
         title="Programs that share no formula, from the same touches",
@@ -218,7 +218,7 @@ def figure_map(results: LandingStudy) -> Figure:
 @styled
 def figure_static(results: LandingStudy) -> Figure:
     """Of the throws that the static criterion calls upright, and of those it does not, the share that stands."""
-    names = [name for name, (said, others) in results.static.items() if said.throws + others.throws]
+    names = [name for name, (below, above) in results.static.items() if below.throws + above.throws]
     figure, axes = new_figure(size=(8.6, 3.9))
     width = 0.38
     looks = (("#0072B2", "tilt below the toppling angle at touch"), ("#D55E00", "tilt above it"))
@@ -267,7 +267,7 @@ def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
     for axes in panels.ravel()[len(matrices) :]:
         axes.set_axis_off()
     for axes, (case, matrix) in zip(panels.ravel(), matrices, strict=False):
-        counts = np.array([[matrix["outcomes"].get(f"{one}/{other}", 0) for other in names] for one in names])
+        counts = np.array([[matrix["outcomes"].get(f"{outcome}/{other}", 0) for other in names] for outcome in names])
         axes.imshow(np.sqrt(counts), cmap="Blues", vmin=0.0, vmax=1.6 * math.sqrt(matrix["touches"]))
         for (row, column), count in np.ndenumerate(counts):
             if count:
@@ -318,9 +318,9 @@ def map_csv(results: LandingStudy) -> str:
 def static_csv(results: LandingStudy) -> str:
     """Return how often the static criterion and the outcome agree."""
     rows = [
-        [family, KINDS[kind].words, said, upright, count]
+        [family, KINDS[kind].words, below, upright, count]
         for (family, kind), shares in results.static.items()
-        for said, share in zip(("yes", "no"), shares, strict=True)
+        for below, share in zip(("yes", "no"), shares, strict=True)
         for upright, count in (("yes", share.upright), ("no", share.throws - share.upright))
     ]
     return rows_csv(("family", "landed", "tilt below toppling angle at touch", "upright", "throws"), rows, digits=None)

@@ -75,10 +75,10 @@ def told(rows: Sequence[Row], table: Table) -> str:
         f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g} (both assumed: no "
         "measured ones were found)"
     ]
-    said: set[str] = set()
+    bottles: set[str] = set()
     for row in rows:
-        if row.name not in said:
-            said.add(row.name)
+        if row.name not in bottles:
+            bottles.add(row.name)
             lines.append(_touch_line(row.name, row.touch))
         program = "event by event" if row.program == REFERENCE else row.program
         lines.append(f"  {program if row.law is None else f'{program}, {row.law}':34} {_how(row.outcome)}")

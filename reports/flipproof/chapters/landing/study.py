@@ -140,10 +140,10 @@ class Cell:
 
         Of one aim, another aim plays no part.
         """
-        one, another = self.share, other.share
+        share, another = self.share, other.share
         if self.aim == other.aim:
-            one, another = replace(one, rival=0.0), replace(another, rival=0.0)
-        return one.minus(another, correlation(self.stood, other.stood))
+            share, another = replace(share, rival=0.0), replace(another, rival=0.0)
+        return share.minus(another, correlation(self.stood, other.stood))
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,24 +238,24 @@ def aiming(throw: Scenario, size: Size) -> tuple[Cases, Mapping[Place, str]]:
 
 def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
     """Return the throws that are counted, about the aims that stood most often, and the map."""
-    tried: dict[Place, list[tuple[tuple[int, float], Share, Aim]]] = {}
-    for (key, case), some in zip(aims.items(), rows, strict=True):
-        share = share_of(some)
+    candidates: dict[Place, list[tuple[tuple[int, float], Share, Aim]]] = {}
+    for (key, case), throws in zip(aims.items(), rows, strict=True):
+        share = share_of(throws)
         # Of equals the least offset.
-        tried.setdefault(key.place, []).append(((share.upright, -abs(key.value)), share, case.aim))
+        candidates.setdefault(key.place, []).append(((share.upright, -abs(key.value)), share, case.aim))
     aim_of: dict[Place, Aim] = {}
-    for place, ranked in tried.items():
-        ranked.sort(key=lambda each: each[0])
+    for place, ranked in candidates.items():
+        ranked.sort(key=lambda candidate: candidate[0])
         *others, (_, _, aim) = ranked
         aim_of[place] = replace(aim, rival=max((share.interval[1] for _, share, _ in others), default=0.0))
-    asked: dict[Key, Case] = {}
+    cases: dict[Key, Case] = {}
     last = size.families[-1]
     for (family, filling, frozen), aim in aim_of.items():
         if filling not in size.fillings:
             continue
         for kind, landing in KINDS.items():
             if landing.frozen == frozen:
-                asked |= _cut(size, Key("filling", filling, family, filling, kind), _case(size, aim, kind, size.throws))
+                cases |= _cut(size, Key("filling", filling, family, filling, kind), _case(size, aim, kind, size.throws))
     values = {"restitution": size.restitutions, "friction": size.frictions, "scatter": size.scatters}
     for kind, axis in product(AXIS_KINDS, values):
         place = last, size.axis_filling, KINDS[kind].frozen
@@ -264,13 +264,13 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
         for value in values[axis]:
             change: dict[str, Any] = {axis: size.scatter.times(value) if axis == "scatter" else value}
             case = replace(_case(size, aim_of[place], kind, size.axis_throws, AXES[axis]), **change)
-            asked |= _cut(size, Key(axis, value, last, size.axis_filling, kind), case)
+            cases |= _cut(size, Key(axis, value, last, size.axis_filling, kind), case)
     fillings, omegas = size.map_axes
     for kind, fill, omega0 in product(WATER_AND_ICE, fillings.tolist(), omegas.tolist()):
         bottle = replace(filled(throw, fill, size.slices, KINDS[kind].frozen), omega0=omega0)
         case = replace(_case(size, standing(bottle), kind, 1, MAPPING), scatter=size.scatter.times(0.0))
-        asked[Key("map", omega0, "", fill, kind)] = case
-    return asked
+        cases[Key("map", omega0, "", fill, kind)] = case
+    return cases
 
 
 def _cut(size: Size, key: Key, case: Case) -> dict[Key, Case]:
@@ -329,26 +329,26 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
     counted: dict[Key, tuple[Aim, list[Landed]]] = {}
     shape = len(omegas), len(fillings)
     maps: dict[Kind, Outcomes] = {}
-    for (key, case), some in zip(cases.items(), rows, strict=True):
+    for (key, case), throws in zip(cases.items(), rows, strict=True):
         if key.axis == "map":
             outcomes = maps.setdefault(key.kind, Outcomes(np.full(shape, "", "U9"), np.full(shape, np.nan)))
             at = omegas.tolist().index(key.value), fillings.tolist().index(key.filling)
-            outcomes.outcome[at] = some[0].outcome or some[0].status
-            outcomes.theta[at] = np.nan if some[0].touch_theta is None else some[0].touch_theta
+            outcomes.outcome[at] = throws[0].outcome or throws[0].status
+            outcomes.theta[at] = np.nan if throws[0].touch_theta is None else throws[0].touch_theta
             continue
-        counted.setdefault(key._replace(cut=0), (case.aim, []))[1].extend(some)
+        counted.setdefault(key._replace(cut=0), (case.aim, []))[1].extend(throws)
         if key.axis == "filling":
-            said, others = sorts.setdefault((key.family, key.kind), ([], []))
-            decided = [row for row in some if row.outcome not in (None, "undecided")]
-            said += [row for row in decided if (row.static_margin or 0.0) > 0.0]
-            others += [row for row in decided if not (row.static_margin or 0.0) > 0.0]
-    cells = {key: cell_of(aim, some) for key, (aim, some) in counted.items()}
+            below, above = sorts.setdefault((key.family, key.kind), ([], []))
+            decided = [row for row in throws if row.outcome not in (None, "undecided")]
+            below += [row for row in decided if (row.static_margin or 0.0) > 0.0]
+            above += [row for row in decided if not (row.static_margin or 0.0) > 0.0]
+    cells = {key: cell_of(aim, throws) for key, (aim, throws) in counted.items()}
     return LandingStudy(
         throw=throw,
         size=size,
         cells=cells,
         maps=maps,
-        static={name: (share_of(said), share_of(others)) for name, (said, others) in sorts.items()},
+        static={name: (share_of(below), share_of(above)) for name, (below, above) in sorts.items()},
         energies=tuple(energy for kind in WATER_AND_ICE for energy in _energies(kind, cases, rows, size)),
         unaimed=unaimed,
     )
@@ -377,14 +377,14 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
 
 def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
     """Follow the energy of the first ten throws counted at the filling of the axes."""
-    wanted = Key("filling", size.axis_filling, size.families[-1], size.axis_filling, kind, size.cuts[0])
-    if wanted not in cases:
+    key = Key("filling", size.axis_filling, size.families[-1], size.axis_filling, kind, size.cuts[0])
+    if key not in cases:
         return []
-    case, some = cases[wanted], rows[list(cases).index(wanted)]
+    case, throws = cases[key], rows[list(cases).index(key)]
     design = Throws(cases=(case,), seed=size.seed)
     table = Table(height=case.aim.height, restitution=case.restitution, friction=case.friction)
     energies = []
-    for place, row in enumerate(islice(some, 10)):
+    for place, row in enumerate(islice(throws, 10)):
         if row.outcome not in (None, "undecided"):
             run = path(fly(design.thrown(case, place), table), table, case.law, duration=0.45)
             energies.append(Energy(kind, run.t, run.energy / run.saddle, str(row.outcome)))

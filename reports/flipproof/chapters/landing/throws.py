@@ -204,8 +204,8 @@ class Share:
         difference = self.value - other.value
         (low, high), (other_low, other_high) = self.interval, other.interval
 
-        def distance(one: float, another: float) -> float:
-            return math.sqrt(max(one**2 - 2.0 * phi * one * another + another**2, 0.0))
+        def distance(first: float, second: float) -> float:
+            return math.sqrt(max(first**2 - 2.0 * phi * first * second + second**2, 0.0))
 
         return (
             difference,

@@ -78,7 +78,7 @@ def study(ask: Ask) -> Study[Maps]:
     def mapped(axis: Axis) -> ValidityMap:
         # Cells of a chunk whose worker died stay "not run".
         answers = [(call.arguments[0], attempt(flights.answer, call).found or ()) for call in calls[axis]]
-        readings = {run: reading for chunk, found in answers for run, reading in zip(chunk, found, strict=False)}
+        readings = {run: reading for chunk, answer in answers for run, reading in zip(chunk, answer, strict=False)}
         return study_readings(cut, axis, *ends[axis], readings, steps=ask.steps)
 
     return {axis: attempt(mapped, axis) for axis in AXES}
@@ -86,9 +86,9 @@ def study(ask: Ask) -> Study[Maps]:
 
 def claims(found: Maps) -> Claims:
     """Yield which map could not be made."""
-    for axis, each in found.items():
-        if each.found is None:
-            yield Absent(f"map-{axis}", f"map over {axis}", each.reason, "observation")
+    for axis, outcome in found.items():
+        if outcome.found is None:
+            yield Absent(f"map-{axis}", f"map over {axis}", outcome.reason, "observation")
 
 
 def figures(found: Maps) -> Iterator[Exhibit]:
@@ -144,22 +144,22 @@ def _as_drawn(values: Any, axis: Axis) -> Any:
 
 def _beyond(study: ValidityMap) -> str:
     """Return in how many cells overlap changes more than any assumption of the ladder does, and what that compares."""
-    known = np.isfinite(study.overlap) & np.isfinite(study.shares).all(axis=0)
-    more = int((np.abs(study.overlap) > np.abs(study.shares).max(axis=0))[known].sum())
+    finite = np.isfinite(study.overlap) & np.isfinite(study.shares).all(axis=0)
+    more = int((np.abs(study.overlap) > np.abs(study.shares).max(axis=0))[finite].sum())
     return (
         f"The change by overlap is the difference of two models, free flight at N = {study.slices} and rods, and "
         "no fair share: rods have no assumptions of the ladder to mend. In "
-        f"{more} of {int(known.sum())} cells it is larger than the largest fair share"
+        f"{more} of {int(finite.sum())} cells it is larger than the largest fair share"
     )
 
 
 def _band_words(study: ValidityMap) -> str:
     """Return the bands of free flight, the most sensitive equation, over the cells."""
-    known = np.array([]) if study.band is None else study.band[np.isfinite(study.band)]
-    if not len(known):
+    bands = np.array([]) if study.band is None else study.band[np.isfinite(study.band)]
+    if not len(bands):
         return ""
     return (
-        f" The plateau of free flight has a band of {np.median(known):.1g} in the median cell and of {known.max():.1g} "
+        f" The plateau of free flight has a band of {np.median(bands):.1g} in the median cell and of {bands.max():.1g} "
         f"in the worst, {BAND_WORDS}."
     )
 
@@ -285,8 +285,8 @@ def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[F
     """Return the contour of ``error`` as lines of (fill fraction, value), each of shape (K, 2)."""
     if not _crosses(error, level):
         return []
-    found = Figure().subplots().contour(study.fills, study.values, error, levels=[level])
-    return [np.asarray(line) for line in found.allsegs[0] if len(line)]
+    contours = Figure().subplots().contour(study.fills, study.values, error, levels=[level])
+    return [np.asarray(line) for line in contours.allsegs[0] if len(line)]
 
 
 def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:
@@ -315,7 +315,7 @@ def _outline(inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarit
             (below, ((left, low), (right, low))),
             (above, ((left, high), (right, high))),
         )
-        segments += [np.array(side) for there, side in sides if there]
+        segments += [np.array(side) for outer, side in sides if outer]
     if logarithmic:
         for side in segments:
             side[:, 1] = np.exp(side[:, 1])
@@ -324,8 +324,8 @@ def _outline(inside: NDArray[np.bool_], x: FloatArray, y: FloatArray, *, logarit
 
 def _reasons(study: ValidityMap) -> str:
     """Return every reason once, with the number of cells it holds for."""
-    found, counts = np.unique(study.reason[study.reason != ""], return_counts=True)
-    words = [f"{reason} ({count})" for reason, count in zip(found, counts, strict=True)]
+    reasons, counts = np.unique(study.reason[study.reason != ""], return_counts=True)
+    words = [f"{reason} ({count})" for reason, count in zip(reasons, counts, strict=True)]
     return shortened(", ".join(words[:3]), 80) + (f" and {len(words) - 3} more" if len(words) > 3 else "")
 
 

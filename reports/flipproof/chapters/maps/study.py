@@ -220,16 +220,16 @@ def study_readings(
     free: list[Run] = []
     for at, runs in cells(throw, axis, fills, values, **how):
         free.append(runs[FREE])
-        found = {name: readings.get(run, Reading(problem="not run")) for name, run in runs.items()}
-        truth = found[FREE].omega
-        for name, reading in found.items():
+        cell = {name: readings.get(run, Reading(problem="not run")) for name, run in runs.items()}
+        truth = cell[FREE].omega
+        for name, reading in cell.items():
             level[name][at] = reading.level
             if truth is not None and reading.omega is not None:
                 largest[name][at] = np.abs(reading.omega - truth).max() / abs(throw.omega0)
-        problems = (f"{name}: {reading.problem}" for name, reading in found.items() if reading.problem)
+        problems = (f"{name}: {reading.problem}" for name, reading in cell.items() if reading.problem)
         reason[at] = shortened("; ".join(problems), 80)
     levels = {run: reading.level for run, reading in readings.items()}
-    banded = all(each in levels for run in free for each in (run, *twins(run)))
+    banded = all(member in levels for run in free for member in (run, *twins(run)))
     of_sets = {switches: level[name] for switches, name in SETS.items()}
     return ValidityMap(
         axis=axis,
@@ -241,7 +241,7 @@ def study_readings(
         step_error={scheme: np.abs(level[scheme] - level[LIMITS[scheme]]) for scheme in SCHEMES},
         reason=reason,
         shares=np.array(
-            [level[LADDER[1]] - level[LADDER[0]], *fair_shares(NAMES, lambda made: of_sets[mended(made)]).values()]
+            [level[LADDER[1]] - level[LADDER[0]], *fair_shares(NAMES, lambda names: of_sets[mended(names)]).values()]
         ),
         band=np.array([band(run, levels) for run in free]).reshape(shape) if banded else None,
         thrown=place_of(throw, axis, how.get("steps", 1000)),

@@ -287,7 +287,7 @@ Results = tuple[Mapping[tuple[str, str], Outcome[ModelForm]], Mapping[str, Outco
 def study(ask: Ask) -> Study[Results]:
     """Halve the step of the schemes of FORMS; fit omega of the pairs that ``ask.work`` lists, in workers."""
     levels = {scheme: plan_step_size(ask.throw, scheme, base=37, multiple=54, count=6) for scheme in dict(FORMS)}
-    grids = (run for each in levels.values() for level in each for run in level)
+    grids = (run for halvings in levels.values() for level in halvings for run in level)
     flights = yield [*(Run(model, ask.throw) for _, model in ask.work), *grids]
 
     def fit(scheme: str, model: str) -> Call:

@@ -89,23 +89,23 @@ def plan_overlap(throw: Scenario, fills: Sequence[float], slices: int, dt: float
 def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], made: Mapping[Run, Made]) -> Overlap:
     """Read the runs that ``plan_overlap`` planned over these fill fractions."""
 
-    def read(each: Made) -> tuple[float, str]:
+    def read(result: Made) -> tuple[float, str]:
         """Return the plateau of a run, or NaN and why it cannot be used."""
-        flight = each.trajectory
+        flight = result.trajectory
         if flight is None:
-            return np.nan, each.reason
+            return np.nan, result.reason
         if not flight.ok:
             return np.nan, f"{flight.status}: {flight.message}"
         return plateau(flight.t, flight.omega, flight.scenario.omega0), ""
 
-    found = {name: list(zip(*(read(made[run]) for run in curve), strict=True)) for name, curve in runs.items()}
-    level = {name: np.array(found[name][0]) for name in (PASS, EXCLUDE, CHECK, COLUMN, RODS)}
+    readings = {name: list(zip(*(read(made[run]) for run in curve), strict=True)) for name, curve in runs.items()}
+    level = {name: np.array(readings[name][0]) for name in (PASS, EXCLUDE, CHECK, COLUMN, RODS)}
     return Overlap(
         fills=np.asarray(fills),
         throw=runs[PASS][0].scenario,
         level=level,
-        reason={name: list(found[name][1]) for name in level},
-        band=2.0 * np.abs(level[EXCLUDE] - found[COARSER][0]),
+        reason={name: list(readings[name][1]) for name in level},
+        band=2.0 * np.abs(level[EXCLUDE] - readings[COARSER][0]),
     )
 
 
@@ -156,14 +156,14 @@ def claims(found: Found) -> Claims:
 def claim_column(study: Overlap) -> Finding:
     """What overlap changes between two exact equations, over the fill fraction: free flight minus the column."""
     cost = study.cost_to_column
-    known = np.flatnonzero(np.isfinite(cost)).tolist()
-    each = ", ".join(f"{cost[k]:+.3f} at {study.fills[k]:.0%}" for k in known)
+    computed = np.flatnonzero(np.isfinite(cost)).tolist()
+    words = ", ".join(f"{cost[k]:+.3f} at {study.fills[k]:.0%}" for k in computed)
     title = "plateau of ω/ω₀ of free flight, whose slices overlap, minus that of a column: the largest over fillings"
     note = (
         f"a difference of two models, no share; free flight at N = {study.throw.n_slices}, the column has no slices; "
     )
-    largest = float(max((cost[k] for k in known), key=abs)) if known else None
-    return observed("overlap-column", title, largest, note=note + (each or "not computed at any filling"))
+    largest = float(max((cost[k] for k in computed), key=abs)) if computed else None
+    return observed("overlap-column", title, largest, note=note + (words or "not computed at any filling"))
 
 
 def figures(found: Found) -> Iterator[Exhibit]:

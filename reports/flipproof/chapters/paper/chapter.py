@@ -22,7 +22,7 @@ def study(ask: Ask) -> Study[Paper]:
     del ask
     plan = plan_claims()
     calls = [*group_calls(plan_figures(), "the paper's figures"), *group_calls(plan, "the paper's statements")]
-    flights = yield [*calls, *(each.run for each in plan if not each.grouped)]
+    flights = yield [*calls, *(planned.run for planned in plan if not planned.grouped)]
     runs = PaperRuns.of(flights, calls, plan)
     return Paper(runs, judge_paper(runs))
 

@@ -32,7 +32,7 @@ def study(ask: Ask) -> Study[Results]:
         if second and model in CROSS_CHECKED:
             runs[model].append(Run(model, throw, {"method": second}, f"{model}, {second}"))
     # The slowest first.
-    flights = yield [each[way] for way in (2, 1, 0) for each in runs.values() if way < len(each)]
+    flights = yield [ways[way] for way in (2, 1, 0) for ways in runs.values() if way < len(ways)]
     return {model: [flights[run] for run in runs[model]] for model in LADDER if model in runs}
 
 
@@ -54,7 +54,7 @@ def claims(results: Results) -> Claims:
 
 def claim_reference_converged(usual: Trajectory, witness: Trajectory) -> Finding:
     """An independent integration of all 2N + 1 equations with a tenth of the rest speed gives the same flight."""
-    one, other = usual.settings, witness.settings
+    settings, other = usual.settings, witness.settings
     # Where a slice that rests pushes the tube and one that bounces below the rest speed does not.
     wider = {"accelerating-origin": 1e-4, "free-flight": 3e-3}
     return claim_change(
@@ -63,8 +63,8 @@ def claim_reference_converged(usual: Trajectory, witness: Trajectory) -> Finding
         usual,
         witness,
         wider.get(usual.method, BAND),
-        differ=one["method"] != other["method"] and 10 * other["rest_speed"] <= one["rest_speed"] * 1.001,
-        note=f"rest speed {one['rest_speed']:g} → {other['rest_speed']:g} m/s; {one['method']} → "
+        differ=settings["method"] != other["method"] and 10 * other["rest_speed"] <= settings["rest_speed"] * 1.001,
+        note=f"rest speed {settings['rest_speed']:g} → {other['rest_speed']:g} m/s; {settings['method']} → "
         f"{other['method']}, rtol {other['rtol']:g}, longest step {other['max_step']:g} s",
     )
 

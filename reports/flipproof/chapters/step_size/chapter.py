@@ -158,24 +158,24 @@ def study(ask: Ask) -> Study[Orders]:
     """
     # Throw, first multiple of the 37 intervals that all grids share (a divisor of the 999 of the default output times),
     # levels, and the names of both parts.
-    asked = [(ask.reference, 108, 4, *CHECKED)] + ([(ask.throw, 27, ask.work, START, WHOLE)] if ask.work else [])
+    plans = [(ask.reference, 108, 4, *CHECKED)] + ([(ask.throw, 27, ask.work, START, WHOLE)] if ask.work else [])
     grids: dict[tuple[str, str], Outcome[Grids]] = {}
-    for throw, multiple, levels, _, part in asked:
+    for throw, multiple, levels, _, part in plans:
         for scheme in SCHEMES:
             truth = Run(LIMITS[scheme], throw)
             grids[part, scheme] = Outcome([[truth], *plan_step_size(throw, scheme, 37, multiple, levels)])
     flights = yield chain.from_iterable(chain.from_iterable(known(grids).values()))
-    for throw, _, levels, start, _ in asked:
+    for throw, _, levels, start, _ in plans:
         for scheme in SCHEMES:
             truth = Run(LIMITS[scheme], throw)
             grids[start, scheme] = attempt(_start, truth, flights, scheme, levels)
     flights = yield chain.from_iterable(chain.from_iterable(known(grids).values()))
 
-    def measured(each: Outcome[Grids]) -> StepSize:
-        (truth,), *levels = flights.levels(each.value)
+    def measured(outcome: Outcome[Grids]) -> StepSize:
+        (truth,), *levels = flights.levels(outcome.value)
         return study_step_size(truth, levels)
 
-    return {part: attempt(measured, each) for part, each in grids.items()}
+    return {part: attempt(measured, outcome) for part, outcome in grids.items()}
 
 
 def _start(truth: Run, flights: Flights, scheme: str, levels: int) -> Grids:
@@ -202,7 +202,7 @@ def claims(results: Orders) -> Claims:
 
 def _measured(results: Orders, where: str) -> list[StepSize]:
     """Return the studies of a part that could be made."""
-    return [each for (part, _), each in known(results).items() if part == where]
+    return [result for (part, _), result in known(results).items() if part == where]
 
 
 def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Finding:
@@ -244,10 +244,10 @@ def figures(results: Orders) -> Iterator[Exhibit]:
             ("part of the flight", "scheme", "held against", "mean dt [s]", "mean error [of omega_0]",
              "least error [of omega_0]", "largest error [of omega_0]", "fitted order [1]", "its standard error [1]"),
             (
-                (part, each.scheme, each.model, dt, mean, errors.min(), errors.max(), each.order, each.order_error)
+                (part, curve.scheme, curve.model, dt, mean, errors.min(), errors.max(), curve.order, curve.order_error)
                 for part, parted in (("whole flight", studies), ("before the first impact", starts))
-                for each in parted
-                for dt, mean, errors in zip(each.mean_dt, each.mean_error, each.error, strict=True)
+                for curve in parted
+                for dt, mean, errors in zip(curve.mean_dt, curve.mean_error, curve.error, strict=True)
             ),
         ),
     )  # fmt: skip

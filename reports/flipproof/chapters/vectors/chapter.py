@@ -14,16 +14,16 @@ def study(ask: Ask) -> Study[list[tuple[Vector, Made]]]:
     """Repeat every published run; these are throws of the paper, whatever the report's own is."""
     del ask
     vectors = load_all()
-    runs = [Run(each.scheme, each.scenario, {"steps": each.steps}, f"vector {each.name}") for each in vectors]
+    runs = [Run(vector.scheme, vector.scenario, {"steps": vector.steps}, f"vector {vector.name}") for vector in vectors]
     flights = yield runs
     return [(vector, flights[run]) for vector, run in zip(vectors, runs, strict=True)]
 
 
 def claims(results: list[tuple[Vector, Made]]) -> Claims:
     """Yield the largest deviation of each run from what was printed."""
-    for vector, made in results:
+    for vector, result in results:
         title = f"output of the paper's program, {vector.name}"
-        yield judged(claim_vectors, vector, made, id=f"vectors-{vector.name}", title=title)
+        yield judged(claim_vectors, vector, result, id=f"vectors-{vector.name}", title=title)
 
 
 def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:

@@ -146,7 +146,7 @@ def figures(found: Water) -> Iterator[Exhibit]:
     columns |= {f"plateau of omega/omega_0 {name} [1]": level for name, level in found.level.items()}
     columns |= {"fill fraction of fluids [1]": fills, "lowest fluid [1]": low, "highest fluid [1]": high}
     columns |= {"lowest of our own fluid [1]": own_band()[1], "highest of our own fluid [1]": own_band()[2]}
-    told = "; ".join(
+    plateaus = "; ".join(
         f"{name_of(name)}: " + ", ".join(f"{found.at(name, f):.3f} at {f:g}" for f in fluids()["fillings"])
         for name in EQUATIONS
     )
@@ -159,7 +159,7 @@ def figures(found: Water) -> Iterator[Exhibit]:
         "bars: range of the two fluids over the starts of their water. Below a quarter full the fluids disagree; from "
         "a half to three quarters ours keeps less spin than the recorded grid. All fluids are recorded, not computed "
         "for this report.",
-        alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction. Fluids {band}. {told}.",
+        alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction. Fluids {band}. {plateaus}.",
         maker=figure_water,
         data=(found,),
         table=columns_csv(columns),
@@ -227,5 +227,5 @@ CHAPTER: Final = Chapter(
     claims=claims,
     figures=figures,
     summary=summary,
-    page=lambda found: {"water": verdict(found)},
+    page=lambda water: {"water": verdict(water)},
 )

@@ -30,7 +30,8 @@ class Held(NamedTuple):
         """Return sign, colour, verdict and number of each fluid."""
         words = {"holds": "agrees", "fails": "disagrees"}
         return tuple(
-            (*MARKS[one.verdict], words.get(one.verdict, one.verdict), one.value_text) for one in self.readings
+            (*MARKS[reading.verdict], words.get(reading.verdict, reading.verdict), reading.value_text)
+            for reading in self.readings
         )
 
 
@@ -38,15 +39,15 @@ def held() -> tuple[Held, ...]:
     """Return every statement about water with the readings of both fluids; ice is not thrown."""
     fluids = [flights(suction=suction) for suction in NAMES]
     return tuple(
-        Held(each.says, each.means, tuple(compare(each, fluid) for fluid in fluids))
-        for each in OBSERVATIONS
-        if each.id != "ice"
+        Held(observation.says, observation.means, tuple(compare(observation, fluid) for fluid in fluids))
+        for observation in OBSERVATIONS
+        if observation.id != "ice"
     )
 
 
 def standing(statements: tuple[Held, ...]) -> str:
     """Return with how many statements either fluid agrees, in words."""
-    without, sucked = (sum(each.readings[k].verdict == "holds" for each in statements) for k in range(2))
+    without, sucked = (sum(statement.readings[k].verdict == "holds" for statement in statements) for k in range(2))
     of = f"{without} of the {len(statements)} statements about water"
     return f"Without suction our fluid agrees with {of}, with suction with {sucked}."
 

@@ -189,21 +189,21 @@ def _run(equation: str, filling: float, ask: Ask) -> Run:
     return Run(equation, throw, {"times": _times(ask)}, label)
 
 
-def _level(made: Made) -> float:
-    run = made.trajectory
+def _level(result: Made) -> float:
+    run = result.trajectory
     return float("nan") if run is None or not run.ok else plateau(run.t, run.omega, run.scenario.omega0)
 
 
-def _early(made: Made) -> float:
-    run = made.trajectory
+def _early(result: Made) -> float:
+    run = result.trajectory
     if run is None or not run.ok:
         return float("nan")
     below = np.flatnonzero(run.omega / run.scenario.omega0 < 0.75)
     return float(run.t[below[0]]) if below.size else float("nan")
 
 
-def _apart(made: Made, curve: list[float]) -> float:
-    run = made.trajectory
+def _apart(result: Made, curve: list[float]) -> float:
+    run = result.trajectory
     if run is None or not run.ok:
         return float("nan")
     times = np.linspace(0.0, run.scenario.duration, len(curve))

@@ -207,9 +207,9 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
     bars = [Bar(name=STEP, finer=more[none] - observed[finer(program)] if more else None, **alike)]
     bars += bars_of(
         tuple(NAMES),
-        lambda made: values[mended(made)],
-        lambda made: bands[mended(made)],
-        fair_shares(NAMES, lambda made: more[mended(made)]) if more else {},
+        lambda names: values[mended(names)],
+        lambda names: bands[mended(names)],
+        fair_shares(NAMES, lambda names: more[mended(names)]) if more else {},
     )
     return Waterfall(
         observable=observable,
@@ -222,7 +222,7 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
         rods=observed[rods_run(program.scenario)],
         finer_end=more[everything] if more else None,
         groupings={
-            words: grouped_shares(groups, lambda made: values[mended(made)]) for words, groups in GROUPINGS.items()
+            words: grouped_shares(groups, lambda names: values[mended(names)]) for words, groups in GROUPINGS.items()
         },
     )
 

@@ -28,7 +28,7 @@ def study(ask: Ask) -> Study[WorkPrecision]:
     # After the other runs, so that the compiled loop is there and its compiling is not counted.
     yield ()
     flights = yield calls
-    return study_work_precision(plan, {made.run: made for call in calls for made in flights.answer(call)})
+    return study_work_precision(plan, {result.run: result for call in calls for result in flights.answer(call)})
 
 
 def claims(study: WorkPrecision) -> Iterator[Finding]:
@@ -53,9 +53,9 @@ def claims(study: WorkPrecision) -> Iterator[Finding]:
 def _pair(study: WorkPrecision, first_key: str, second_key: str) -> Finding:
     """Compare two contenders of one equation at the smallest error that both keep."""
     first, second = study.curves[first_key], study.curves[second_key]
-    one, other = first.contender.name, second.contender.name
-    id_ = f"work-{one}-{other}".replace(" ", "-")
-    title = f"steps of {one} for one of {other}, at equal error against {first.contender.equation}"
+    name, other = first.contender.name, second.contender.name
+    id_ = f"work-{name}-{other}".replace(" ", "-")
+    title = f"steps of {name} for one of {other}, at equal error against {first.contender.equation}"
     for error in (10.0 ** (-k / 2) for k in range(22, 1, -1)):
         steps_a, steps_b = first.price(error, "steps"), second.price(error, "steps")
         if steps_a is not None and steps_b is not None:
@@ -71,7 +71,7 @@ def _pair(study: WorkPrecision, first_key: str, second_key: str) -> Finding:
 
     limit = {(False, True): "at least, ", (True, False): "at most, "}.get((steps_a.bound, steps_b.bound), "")
     count_a, count_b = (f"{'at most ' if steps.bound else ''}{steps.value:.0f}" for steps in (steps_a, steps_b))
-    note = f"error {error:.1e} of ω₀: {count_a} steps of {one}, {count_b} of {other}; "
+    note = f"error {error:.1e} of ω₀: {count_a} steps of {name}, {count_b} of {other}; "
     note += f"{against('work', 'updates of one slice')}, {against('seconds', 'ms of processor time', 1e3)}"
     return observed(id_, limit + title, steps_a.value / steps_b.value, note=note)
 
@@ -130,7 +130,9 @@ def figures(study: WorkPrecision) -> Iterator[Exhibit]:
 
     levels = "; ".join(map(reached, study.curves.values()))
     references = study.references.items()
-    floors = ", ".join(f"{name} {each.floor:.1e}" for name, each in references if math.isfinite(each.floor))
+    floors = ", ".join(
+        f"{name} {reference.floor:.1e}" for name, reference in references if math.isfinite(reference.floor)
+    )
     yield Exhibit(
         name=f"work-precision-{NAME}",
         title=f"What a digit costs: {TITLE}",
@@ -196,7 +198,8 @@ def summarise_work_precision(study: WorkPrecision) -> dict[str, Any]:
             "title": TITLE,
             "scenario": study.throw.to_mapping(),
             "references": {
-                name: {"floor": finite_or_none(each.floor), "reason": each.reason} for name, each in references
+                name: {"floor": finite_or_none(reference.floor), "reason": reference.reason}
+                for name, reference in references
             },
             "contenders": {
                 key: {

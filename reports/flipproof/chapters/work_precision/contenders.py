@@ -186,22 +186,22 @@ def _methods(throw: Scenario, effort: Effort, solved: list[str]) -> Iterator[Con
 
 def _reference(throw: Scenario, rival: Contender) -> tuple[Run, ...]:
     """Return the reference of a contender's equation and its witnesses."""
-    asked: list[dict[str, Any]]
+    variants: list[dict[str, Any]]
     if rival.equation in (*MODELS, AT_REST):
         solver, throw = ("eq8", replace(throw, frozen=True)) if rival.equation == AT_REST else (rival.equation, throw)
         usual, times = usual_rest_speed(solver), common_times(throw)
-        asked = [{"method": "taylor", "rest_speed": usual / 10, "times": times}]
+        variants = [{"method": "taylor", "rest_speed": usual / 10, "times": times}]
         for method, rtol, radians in (("LSODA", 1e-10, 0.02), ("DOP853", 1e-11, 0.04)):
             longest = min(radians / abs(throw.omega0), throw.duration)
             tolerances = {"rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": usual, "max_step": longest}
-            asked.append({"method": method, **tolerances, "times": times})
+            variants.append({"method": method, **tolerances, "times": times})
     else:
         # The scheme's own limit: the scheme on a grid eight times finer than its last level, and on half of that.
         solver, settings = rival.levels[-1][0].solver, rival.levels[-1][0].settings
         finest = 8 * (settings["steps"] - 1)
-        asked = [{**settings, "steps": finest // coarser + 1} for coarser in (1, 2)]
+        variants = [{**settings, "steps": finest // coarser + 1} for coarser in (1, 2)]
     names = ("reference", "witness 1", "witness 2")
     return tuple(
         Run(solver, throw, settings, f"work, {name}, {rival.equation}")
-        for name, settings in zip(names, asked, strict=False)
+        for name, settings in zip(names, variants, strict=False)
     )

@@ -61,8 +61,8 @@ def _panel(axes: Axes, study: WorkPrecision, equation: str, bottom: float) -> No
 def _curve(axes: Axes, curve: Curve, k: int) -> None:
     """Draw a curve, the ``k``-th of its family: the line tells the family, the marker who within it."""
     contender, floor = curve.contender, curve.reference.floor
-    known = STYLES.get(contender.name)
-    colour = known["color"] if known else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)])
+    style = STYLES.get(contender.name)
+    colour = style["color"] if style else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)])
     marker = MARKERS[contender.family][k % len(MARKERS[contender.family])]
     whole = [point for point in curve.whole if math.isfinite(point.work)]
     failed = [point.work for point in curve.failed if math.isfinite(point.work)]

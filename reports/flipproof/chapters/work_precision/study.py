@@ -166,23 +166,23 @@ def _reference(runs: Sequence[Made]) -> Reference:
     return Reference(floor=max(ROUND_OFF, *(_error(witness, omega) for witness in runs[1:])), omega=omega)
 
 
-def _omega(made: Made) -> FloatArray:
-    return np.asarray(made.flight.omega[at_times(made.flight.t, common_times(made.run.scenario))])
+def _omega(result: Made) -> FloatArray:
+    return np.asarray(result.flight.omega[at_times(result.flight.t, common_times(result.run.scenario))])
 
 
-def _error(made: Made, truth: FloatArray) -> float:
+def _error(result: Made, truth: FloatArray) -> float:
     """Return the largest error, as a fraction of omega_0."""
-    return float(np.abs(_omega(made) - truth).max() / abs(made.run.scenario.omega0))
+    return float(np.abs(_omega(result) - truth).max() / abs(result.run.scenario.omega0))
 
 
 def _why_failed(runs: Iterable[Made]) -> str:
     """Return why the first run that failed cannot be used, or nothing."""
-    for made in runs:
-        if made.trajectory is None:
-            return made.reason or "it returned nothing"
-        if not made.trajectory.ok:
-            status = made.trajectory.status
-            return f"{status}: {made.trajectory.message.removeprefix(f'{status} ')}"
+    for result in runs:
+        if result.trajectory is None:
+            return result.reason or "it returned nothing"
+        if not result.trajectory.ok:
+            status = result.trajectory.status
+            return f"{status}: {result.trajectory.message.removeprefix(f'{status} ')}"
     return ""
 
 
@@ -205,17 +205,17 @@ def work_of(trajectory: Trajectory) -> float:
 
 
 def _point(members: Sequence[Made], reference: Reference) -> Point:
-    flights = [made.trajectory for made in members]
+    flights = [result.trajectory for result in members]
     costs: dict[str, Any] = {
-        "settings": " to ".join(_words(made.run.settings) for made in (members[0], *members[1:][-1:])),
+        "settings": " to ".join(_words(result.run.settings) for result in (members[0], *members[1:][-1:])),
         "work": _geometric([math.nan if flight is None else work_of(flight) for flight in flights]),
         "steps": _geometric([math.nan if flight is None else _steps(flight) for flight in flights]),
-        "seconds": _geometric([made.seconds for made in members]),
+        "seconds": _geometric([result.seconds for result in members]),
     }
     reason = _why_failed(members)
     if reason or reference.omega is None:
         return Point(**costs, reason=reason or f"no reference: {reference.reason}")
-    errors = np.array([_error(made, reference.omega) for made in members])
+    errors = np.array([_error(result, reference.omega) for result in members])
     error = float(np.sqrt(np.mean(errors**2)))
     lowest, highest = float(errors.min()), float(errors.max())
     return Point(**costs, error=error, lowest=lowest, highest=highest, at_floor=error <= reference.floor)
