@@ -167,12 +167,12 @@ def test_five_lines_say_what_the_numbers_say():
         )
     )
     assert said == {
-        "May ω be held constant over a step?": "Yes: up to 1 %, if rebounds keep their own times.",
+        "May ω, θ, r_CM and v_CM be held constant over a step?": "Yes: up to 1 %, with rebounds at their own times.",
         "Are 1000 steps enough?": "Yes: up to 0.5 % off what shorter steps approach.",
         "Does the program solve Eq. 8?": "No: up to 42 % off, but only 13 % (N = 100: 12 %) off free flight.",
         "Is Eq. 8 free flight?": "No: up to 55 % apart up to t = 500 ms, where free flight ended.",
-        "Does a physics engine agree with free flight?": "Yes: up to 0.11 % off, by pymunk (numerical uncertainty "
-        "of the two runs: 0.98 %).",
+        "Does a physics engine agree with free flight?": "Yes, as far as they can tell: up to 0.11 % off, by "
+        "pymunk (numerical uncertainty of the two runs: 0.98 %).",
     }
 
 

@@ -20,7 +20,7 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
      "Which pairs of solvers differ by how much, when the difference is largest, and when it first exceeds 1 % of ω₀.",
      ("differences",)),
     ("steps", "Step size",
-     "How the error falls as the step becomes shorter, and what holding ω constant over a step costs by itself.",
+     "How the error falls with the step, and what it costs to hold ω, θ, r_CM and v_CM constant over a step.",
      ("finite_step", "step_size", "frozen", "model_form")),
     ("slices", "How many slices", "How far the numbers move when the water is cut into more slices.", ("slices",)),
     ("events", "Impacts", "When slices hit the ends in each solver, which impacts correspond, and how a small change "

@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 
 from flipproof.film.curves import SLICES, STEP, Curve, Equation
 from flipproof.film.kernel.scoring import turnings
-from flipproof.film.likelihood import GRAVITY, HAND, TOUCH, Film, Fit, Held, Likelihood
+from flipproof.film.likelihood import GRAVITY, HAND, POWERS, TOUCH, Film, Fit, Held, Likelihood
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -169,6 +169,9 @@ def estimate(
     reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, x in starts) + 0.5  # the touch may turn out later
     equation = Equation(solver, sliced, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
     likelihood, x = starts[0] if len(starts) == 1 else _chosen(starts, equation)
+    if likelihood.two:
+        likelihood = likelihood.but(orders=POWERS)
+        x = np.insert(x, -2, np.zeros(3 * (POWERS - 1)))
     likelihood, grid, complete = _closed_in(likelihood, equation, x, seconds)
     if not np.isfinite(grid.masses).any():
         raise NoFlightError(f"{film.label}: {solver}: no flight fits the clicks; check that y points up")
@@ -182,7 +185,7 @@ def estimate(
     rng = np.random.default_rng(1)
     picked = rng.choice(len(times), DRAWS, p=chance / chance.sum())
     draws["touch"] = times[picked] + (times[1] - times[0]) * (rng.random(DRAWS) - 0.5)
-    likelihood = Likelihood(film, likelihood.held, likelihood.touch, likelihood.noise, likelihood.speed)
+    likelihood = likelihood.but(film=film)
     return Estimate(
         film=film, throw=sliced, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
         draws=draws, evidence=float(np.logaddexp.reduce(grid.masses) - np.log(np.arcsinh(MAX_RATE / SCALE))),
@@ -195,7 +198,7 @@ def near_flight(film: Film, likelihood: Likelihood, release: float) -> Likelihoo
     margin = 0.15
     near = (film.t >= release - margin) & (film.t <= likelihood.touch + margin)
     part = replace(film, t=film.t[near], values=film.values[:, near], lines=film.lines[near])
-    return Likelihood(part, likelihood.held, likelihood.touch, likelihood.noise, likelihood.speed)
+    return likelihood.but(film=part)
 
 
 # ---------------------------------------------------------------------- the grid over gamma and e
@@ -350,6 +353,7 @@ def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> 
     rates = np.array([(SCALE * np.sinh(a * np.arcsinh(MAX_RATE / SCALE)), e) for a, e in product(*axes)])
     best: tuple[float, Likelihood, FloatArray] | None = None
     flown: list[Curve | None] = []
+    film = starts[0][0].film
     for start, x in starts:
         if not flown or equation.weighted:
             flown = equation.curves(rates, float(x[2]), float(x[1]))
@@ -359,7 +363,7 @@ def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> 
             for _ in range(2):
                 again = likelihood.fitted(curve, fit.x)
                 likelihood = settle(likelihood, curve, again.x)
-            cost = again.cost + (_off_gravity(again.x) if start.two else 0.0)
+            cost = again.cost + (_implausible(film, again.x) if start.two else 0.0)
             if best is None or cost < best[0]:
                 best = cost, likelihood, again.x
     return starts[0] if best is None else best[1:]
@@ -408,7 +412,7 @@ def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
         at = likelihood.index["log_noise"]
         wider = np.exp(moved[:, at : at + 1])
         inner[mine] = fits[k].x + np.where(np.arange(len(root)) == at, moved, moved * wider)
-    parameters = dict(zip(likelihood.film.names, inner.T, strict=True))
+    parameters = dict(zip(likelihood.names, inner.T, strict=True))
     draws = {
         "gamma": SCALE * np.sinh(np.maximum(place[:, 0], 0.0)) * np.abs(parameters["omega0"]),
         "restitution": np.clip(place[:, 1], 0.0, 1.0),
@@ -470,7 +474,7 @@ def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
     touch = float(times[int(np.argmin(costs))])
     if abs(touch - likelihood.touch) < 1e-9 and speed == likelihood.speed:
         return likelihood
-    return Likelihood(likelihood.film, likelihood.held, touch, likelihood.noise, speed)
+    return likelihood.but(touch=touch, speed=speed)
 
 
 # ---------------------------------------------------------------------- the start
@@ -508,7 +512,7 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
         raise NoFlightError(f"{film.label}: cap and base were clicked together in {len(frames)} frames; 8 are needed")
     step = float(np.median(np.diff(t)))
     equation = Equation("free-flight", throw, 30.0)
-    pairs = np.array(list(product((0.02, 0.1, 0.3, 1.0), (0.2, 0.5, 0.8))))
+    pairs = np.array(list(product((0.02, 0.07, 0.2, 0.5, 1.2), (0.2, 0.5, 0.8))))
     every = [curve for curve in equation.curves(pairs, 20.0, 0.0) if curve]
     length = float(np.nanmedian(np.hypot(*(film.values[1] - film.values[0]).T)))
     angle, times = theta[frames], t[frames]
@@ -538,7 +542,7 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
             if better[2][8] < 0.0:  # what accelerates upwards is no flight
                 tried.append(better)
     # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
-    tried.sort(key=lambda guess: guess[0] + _off_gravity(guess[2]))
+    tried.sort(key=lambda guess: guess[0])
     apart_by: list[tuple[float, Likelihood, FloatArray]] = []
     for guess in tried:
         if len(apart_by) < 5 and all(
@@ -556,9 +560,14 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
     return sorted(polished, key=lambda guess: guess[0])
 
 
-def _off_gravity(x: FloatArray) -> float:
-    """Return the cost of a gravity unlike the earth's, 50 at the most: a clock or a stick far off is found, too."""
-    return min(50.0, 0.5 * ((math.hypot(x[7], x[8]) / GRAVITY - 1.0) / 0.1) ** 2)
+def _implausible(film: Film, x: FloatArray) -> float:
+    """Return the cost of a gravity unlike the earth's, and of misses unlike the scatter of the bottle's length.
+
+    Either is bounded: a clock or a stick far off is found, too, and water that no curve of a first guess describes.
+    """
+    gravity = math.log(math.hypot(x[7], x[8]) / GRAVITY) / 0.1
+    misses = max(0.0, float(x[-2]) - math.log(3.0 * film.scatter + 1e-6)) / 0.2
+    return min(100.0, 0.5 * gravity**2) + min(100.0, 0.5 * misses**2)
 
 
 def _better(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[float, Likelihood, FloatArray]:
@@ -566,7 +575,7 @@ def _better(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[float,
     fit = likelihood.fitted(curve, x, 8)
     likelihood = settle(likelihood, curve, fit.x)
     fit = likelihood.fitted(curve, fit.x, 8)
-    return fit.cost, likelihood, fit.x
+    return fit.cost + _implausible(likelihood.film, fit.x), likelihood, fit.x
 
 
 def _rate(t: FloatArray, angle: FloatArray, window: int) -> float:
@@ -580,7 +589,7 @@ def _placed(film: Film, curve: Curve, spin: FloatArray, end: float, length: floa
     """Return all inner parameters for a given spin, the place by a robust linear fit up to ``end``, and the noise."""
     inside = (film.t >= spin[0] - 1e-9) & (film.t <= end + 1e-9)
     part = replace(film, t=film.t[inside], values=film.values[:, inside], lines=film.lines[inside])
-    x = np.array([*spin, 0.0, 0.0, 0.0, 0.0, 0.0, -9.81, length, 0.0, 0.0, 0.0, np.log(0.002), np.log(HAND[0])])
+    x = np.array([*spin, *[0.0] * 5, -9.81, length, 0.0, 0.0, 0.0, np.log(0.002), np.log(HAND[0])])
     likelihood = Likelihood(part, Held(), end, 0.002)
     values, slopes = likelihood.model(curve, x)
     seen = np.repeat(part.clicked[:, :, None], 2, axis=2).ravel()
@@ -595,7 +604,7 @@ def _placed(film: Film, curve: Curve, spin: FloatArray, end: float, length: floa
         weight = 1.0 / np.sqrt(1.0 + (left / (3 * noise)) ** 2)
     x[3:10] += move
     x[9] = length
-    x[13] = np.log(noise)
+    x[-2] = np.log(noise)
     return x, noise
 
 

@@ -31,10 +31,11 @@ OUTDONE: Final = 20.0
 SCALE_ERROR: Final = 0.03
 """Relative error of g that a stick held beside the plane of the throw may make."""
 
-EXCHANGED: Final = 20.0
+EXCHANGED: Final = 50.0
 """Logarithm of a ratio of likelihoods: a film that gains more when cap and base are exchanged is refused.
 
-Of 36 right films, two of each cell of ``benchmarks/films.py``, the first guess lost 64 or more.
+Of 36 right films, two of each cell of ``benchmarks/films.py``, the first guess lost 64 or more; of 30 films by another
+simulator, 29 lost or gained nothing, and one gained 38.
 """
 
 SHOWN: Final = ("gamma", "restitution", "omega0", "theta0", "release", "touch", "tilt", "g", "noise", "length")

@@ -4,10 +4,11 @@
     base(t) = cap(t) + l u                             R = r_CM / L and theta by the equation (``curves``)
 
 Every click of two coordinates misses by a normal deviate of variance v, but for a share of bad clicks, which may lie
-anywhere in the picture. In flight v = sigma^2. Before the release a hand adds accelerations of C_M and of theta that
-nobody knows, which are fitted, and which change at a rate of size A, and after the touch the table takes the velocity:
+anywhere in the picture. In flight v = sigma^2. Before the release a hand adds K powers of tau, from the second on, to
+C_M and to theta, which are fitted, since what a hand does in one frame it does in the next; the power after these has
+the size A, and after the touch the table takes the velocity:
 
-    v = sigma^2 + (A tau^3/6)^2  before,     v = sigma^2 + (V (t - t_d))^2  after,  never beyond the picture.
+    v = sigma^2 + (A tau^(K+2)/(K+2)!)^2  before,    v = sigma^2 + (V (t - t_d))^2  after,  never beyond the picture.
 
 So frames in the hand and on the table count for nothing but for this: release and touch do not jump. A table of theta
 or omega alone has rows of one coordinate, no hand and no table.
@@ -16,7 +17,7 @@ or omega alone has rows of one coordinate, no hand and no table.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +32,18 @@ GRAVITY: Final = 9.81
 BAD: Final = 0.01
 """Share of clicks that may lie anywhere."""
 
-HAND: Final = (500.0, 1.5)
-"""Rate at which the acceleration of a hand changes [m/s^3], and the standard deviation of its logarithm."""
-
 PULL: Final = (60.0, 60.0, 300.0)
-"""Standard deviations of a hand's accelerations less those of flight: of C_M [m/s^2], twice, and of theta [rad/s^2]."""
+"""Standard deviations of a hand's accelerations less those of flight: of C_M [m/s^2], twice, and of theta [rad/s^2];
+and of their derivatives times powers of ``QUICK``."""
+
+HAND: Final = (25.0, 0.5)
+"""Size of the first derivative that is not fitted, scaled alike, and the standard deviation of its logarithm."""
+
+POWERS: Final = 4
+"""Powers of time that a hand adds in the last fits: of its acceleration and of the first three derivatives of that.
+
+First guesses have the acceleration alone: a hand that may do anything could fly the bottle.
+"""
 
 TIGHT: Final = 1e-6
 """Standard deviation of what is held."""
@@ -45,10 +53,7 @@ TOUCH: Final = (1.0, 3.0, 10.0)
 
 Quantity = Literal["points", "theta", "omega"]
 
-POINTS: Final = (
-    "release", "theta0", "omega0", "x0", "y0", "vx", "vy", "ax", "ay", "length", "pull_x", "pull_y", "twist",
-    "log_noise", "log_hand",
-)  # fmt: skip
+PLACED: Final = ("release", "theta0", "omega0", "x0", "y0", "vx", "vy", "ax", "ay", "length")
 SPIN: Final = ("release", "theta0", "omega0", "log_noise")
 """Inner parameters of points and of a table of theta or omega; gamma / |omega_0| and e are the outer ones."""
 
@@ -73,10 +78,12 @@ class Film:
     lines: NDArray[np.int64]
     notes: tuple[str, ...] = ()
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the inner parameters."""
-        return POINTS if self.quantity == "points" else SPIN
+    def names(self, orders: int) -> tuple[str, ...]:
+        """Return the names of the inner parameters, with ``orders`` powers of time that a hand adds."""
+        if self.quantity != "points":
+            return SPIN
+        hand = (f"hand_{order + 2}_{name}" for order in range(orders) for name in ("x", "y", "theta"))
+        return (*PLACED, *hand, "log_noise", "log_hand")
 
     @property
     def clicked(self) -> NDArray[np.bool_]:
@@ -89,6 +96,12 @@ class Film:
         seen = self.values.reshape(-1, self.values.shape[2])
         span = np.nanmax(seen, axis=0) - np.nanmin(seen, axis=0)
         return float(np.prod(np.maximum(span, 1e-3 * max(1e-6, float(span.max())))))
+
+    @property
+    def scatter(self) -> float:
+        """Noise of a click by the scatter of the bottle's clicked length, which needs no equation [m]."""
+        length = np.hypot(*(self.values[1] - self.values[0]).T)
+        return 1.4826 * float(np.nanmedian(np.abs(length - np.nanmedian(length)))) / float(np.sqrt(2.0))
 
     @property
     def angle(self) -> FloatArray:
@@ -139,18 +152,26 @@ class Fit:
 
 
 class Likelihood:
-    """Minus the logarithm of the density of a film's values and of the weak priors, as a function of ``Film.names``."""
+    """Minus the logarithm of the density of a film's values and of the weak priors, as a function of ``names``."""
 
-    def __init__(self, film: Film, held: Held, touch: float, noise: float, speed: float = TOUCH[1]) -> None:
-        """Take the time of the touch, a first guess of the noise, and the velocity that the table takes."""
+    def __init__(
+        self, film: Film, held: Held, touch: float, noise: float, speed: float = TOUCH[1], orders: int = 1
+    ) -> None:
+        """Take the touch, a first guess of the noise, the velocity that the table takes, and the hand's powers."""
         self.film, self.held, self.touch, self.noise, self.speed = film, held, touch, noise, speed
         self.area, self.seen = film.area, film.clicked
         self.two = film.values.shape[2] == 2
-        self.index = {name: k for k, name in enumerate(film.names)}
+        self.orders, self.names = orders, film.names(orders)
+        self.index = {name: k for k, name in enumerate(self.names)}
         self.log_bad = float(np.log(BAD / self.area))
         self.expected, self.stiffness = self._priors()
         fixed = [held.release is not None, self.two and held.tilt, self.two and held.scale]
         self.degrees = (13 if self.two else 3) - sum(fixed)
+
+    def but(self, **changed: Any) -> Likelihood:
+        """Return the same with another film, touch, speed or number of powers."""
+        known = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "speed", "orders")}
+        return Likelihood(**known | changed)
 
     def _priors(self) -> tuple[FloatArray, FloatArray]:
         """Return what priors expect, and their inverse variances, 0 where there is none; each (K,)."""
@@ -160,7 +181,8 @@ class Likelihood:
             priors["release"] = held.release, TIGHT
         if self.two:
             priors["log_hand"] = float(np.log(HAND[0])), HAND[1]
-            priors |= {name: (0.0, size) for name, size in zip(("pull_x", "pull_y", "twist"), PULL, strict=True)}
+            hand = [name for name in self.names if name.startswith("hand_")]
+            priors |= {name: (0.0, size) for name, size in zip(hand, PULL * self.orders, strict=True)}
             if held.tilt:
                 priors["ax"] = 0.0, TIGHT
         elif self.film.quantity == "omega":

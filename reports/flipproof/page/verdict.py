@@ -198,7 +198,7 @@ def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
     steps = by_id["step"].note if "step" in by_id else "the steps"
     also = f", but only {_amount(by_id['whole'])} off free flight" if _nearer_to_free(by_id) else ""
     questions = {
-        "held": ("May ω be held constant over a step?", "{}, if rebounds keep their own times"),
+        "held": ("May ω, θ, r_CM and v_CM be held constant over a step?", "{}, with rebounds at their own times"),
         "step": (f"Are {steps} enough?", "{} off what shorter steps approach"),
         "program-eq8": ("Does the program solve Eq. 8?", f"{{}} off{also}"),
         "eq8-free": ("Is Eq. 8 free flight?", "{} apart"),
@@ -208,8 +208,9 @@ def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
         if id_ in by_id:
             headline = by_id[id_]
             until = f" {headline.note}" if headline.note and id_ not in ("held", "step") else ""
-            yes = "Yes" if headline.value <= PARTING_BAND else "No"
-            yield question, f"{yes}: up to {words.format(_amount(headline))}{_hidden(headline)}{until}."
+            hidden = _hidden(headline)
+            yes = f"Yes{', as far as they can tell' if hidden else ''}" if headline.value <= PARTING_BAND else "No"
+            yield question, f"{yes}: up to {words.format(_amount(headline))}{hidden}{until}."
 
 
 def _nearer_to_free(by_id: Mapping[str, Headline]) -> bool:
@@ -289,7 +290,7 @@ SHARES: Final[Mapping[str, str]] = {
     "mean_eq8": "solvers/eq8/plateau",
     "mean_free": "solvers/free-flight/plateau",
     "agreement": "findings/agreement/value",
-    "overlap": "findings/overlap-full-bottle/value",
+    "overlap": "water/equations/free-flight/fillings/1/plateau",
     "engine_gravity": "findings/engine-gravity/value",
     "second_eq8": "findings/reference-eq8/value",
     "second_free": "findings/reference-free-flight/value",
@@ -400,7 +401,7 @@ def _bars(summary: Summary) -> list[SimpleNamespace]:
 
 
 def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
-    shown = {"landing-angle": degrees, "change-of-behaviour": _shown("{:.3f}")}.get(id_, rounded)
+    shown = {"landing-angle": degrees, "change-of-behaviour": rounded}.get(id_, rounded)
     place = f"paper/experiment/{id_}/equations"
     if summary.at(f"paper/experiment/{id_}") is None:
         return None

@@ -11,6 +11,12 @@ import numpy as np
 
 from slicemodel.compiled import inner, kept_on_disk
 
+QUICK = 0.05
+"""Time in which the acceleration of a hand changes, by which its derivatives are scaled [s]."""
+
+STEADY = 2.5
+"""Least size of the first derivative that is not fitted, scaled alike [m/s^2]: no hand is as steady as a flight."""
+
 
 @kept_on_disk()
 def curve_at(rows, slopes, step, moved, s):
@@ -52,32 +58,41 @@ def points(turning, t, x):
     ``turning`` is what ``curve_at`` gives at |omega_0| (t - release).
     """
     values, slopes = np.zeros((2, len(t), 2)), np.zeros((2, len(t), 2, len(x)))
-    omega0, length = x[2], x[9]
+    omega0, length, orders = x[2], x[9], (len(x) - 12) // 3
     sign = math.copysign(1.0, omega0)
     for i in range(len(t)):
         f, w, r, dr, f_omega, r_omega, f_theta, r_theta = turning[:, i]
         tau = t[i] - x[0]
-        change = min(tau, 0.0)
-        held = 0.5 * change**2
-        theta = x[1] + sign * f + x[12] * held
+        # Before the release a hand adds powers of tau, the second and so on, to C_M and to theta.
+        hand, rate, bend = np.zeros(3), np.zeros(3), np.zeros(orders)
+        power = min(tau, 0.0)
+        for order in range(orders):
+            first = 10 + 3 * order
+            rate += power * x[first : first + 3]
+            bend[order] = power * min(tau, 0.0) / (order + 2)
+            hand += bend[order] * x[first : first + 3]
+            power = bend[order] / QUICK
+        theta = x[1] + sign * f + hand[2]
         u = (math.sin(theta), -math.cos(theta))
         across = (-u[1], u[0])
         # Slopes of theta and R by release, theta_0 and omega_0.
-        turn = (-omega0 * w - x[12] * change, 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0)
+        turn = (-omega0 * w - rate[2], 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0)
         slide = (-abs(omega0) * dr, r_theta, sign * dr * tau + r_omega / omega0)
         for body in range(2):
             along = body - r
             for d in range(2):
                 slope = slopes[body, i, d]
                 values[body, i, d] = (
-                    x[3 + d] + tau * x[5 + d] + 0.5 * tau**2 * x[7 + d] + held * x[10 + d] + length * along * u[d]
+                    x[3 + d] + tau * x[5 + d] + 0.5 * tau**2 * x[7 + d] + hand[d] + length * along * u[d]
                 )
                 for k in range(3):
                     slope[k] = length * (along * turn[k] * across[d] - slide[k] * u[d])
-                slope[0] -= x[5 + d] + tau * x[7 + d] + change * x[10 + d]
-                slope[3 + d], slope[5 + d], slope[7 + d], slope[10 + d] = 1.0, tau, 0.5 * tau**2, held
+                slope[0] -= x[5 + d] + tau * x[7 + d] + rate[d]
+                slope[3 + d], slope[5 + d], slope[7 + d] = 1.0, tau, 0.5 * tau**2
                 slope[9] = along * u[d]
-                slope[12] = length * along * held * across[d]
+                for order in range(orders):
+                    slope[10 + 3 * order + d] = bend[order]
+                    slope[12 + 3 * order] = length * along * bend[order] * across[d]
     return values, slopes
 
 
@@ -89,16 +104,18 @@ def variances(t, x, touch, speed, most):
     at ``most``, beyond the picture.
     """
     variance, slopes = np.empty(len(t)), np.zeros((len(t), len(x)))
-    sigma, hand = math.exp(2 * x[13]), math.exp(x[14])
+    at, orders = len(x) - 2, (len(x) - 12) // 3
+    sigma, scale, power = math.exp(2 * x[at]), 1 / math.gamma(orders + 3) / QUICK**orders, orders + 2
+    hand = scale * (STEADY + math.exp(x[at + 1]))
     for i in range(len(t)):
         before = min(t[i] - x[0], 0.0)
-        pulled = (hand * before**3 / 6) ** 2
+        pulled = (hand * before**power) ** 2
         added = pulled + (speed * max(t[i] - touch, 0.0)) ** 2
         free = most / (most + added)
         variance[i] = sigma + added * free
-        slopes[i, 0] = -(hand**2) * before**5 / 6 * free**2
-        slopes[i, 13] = 2 * sigma
-        slopes[i, 14] = 2 * pulled * free**2
+        slopes[i, 0] = -2 * power * hand**2 * before ** (2 * power - 1) * free**2
+        slopes[i, at] = 2 * sigma
+        slopes[i, at + 1] = 2 * hand * scale * math.exp(x[at + 1]) * before ** (2 * power) * free**2
     return variance, slopes
 
 
