@@ -8,7 +8,7 @@ import pytest
 
 from flipproof.cli.main import main
 from flipproof.film.clip import SCHEMA, read_film
-from flipproof.film.estimate import NoFlightError, estimate, exchange_gain, shortest
+from flipproof.film.estimate import NoFlightError, estimate, exchange_gain, exchanged, shortest
 from flipproof.film.fall import before
 from flipproof.film.judge import EXCHANGED, Judged, UnsoundError, together
 from flipproof.film.likelihood import Film, Held
@@ -49,7 +49,7 @@ def test_the_slope_of_every_value_is_that_of_the_model(poor):
     one = poor[1].estimate
     x = one.fit.x + 1e-3
     _, slopes = one.likelihood.model(one.curve, x)
-    for k in range(13):
+    for k in range(len(x) - 2):
         step = np.zeros(len(x))
         step[k] = 1e-5
         up, down = (one.likelihood.model(one.curve, x + sign * step)[0] for sign in (1, -1))
@@ -218,12 +218,9 @@ def test_an_estimate_that_begins_in_free_flight_is_refused():
 def test_exchanged_ends_are_refused_whatever_flight_is_found_in_them(fps, model):
     """The search would leave the beginning to the hand, and find a late release with a spin far too slow."""
     film = film_of(clip(3, fps=fps, tilt=3.0, model=model))
-    assert exchange_gain(film, THROW, Held()) < -EXCHANGED
-    exchanged = replace(film, values=film.values[::-1].copy())
-    assert exchange_gain(exchanged, THROW, Held()) > EXCHANGED
-    if model == "free-flight":
-        with pytest.raises((UnsoundError, NoFlightError), match="exchanged"):
-            Judged(estimate(exchanged, THROW)).check()
+    assert exchange_gain(estimate(film, THROW), EXCHANGED) < -EXCHANGED
+    with pytest.raises((UnsoundError, NoFlightError), match="exchanged"):
+        Judged(estimate(exchanged(film), THROW)).check()
 
 
 def test_a_grid_without_any_likelihood_is_refused(monkeypatch):
