@@ -27,8 +27,12 @@ def film(
     rng: np.random.Generator, *, fps: float = 240.0, noise: float = 1e-3, tilt: float = 0.0, filling: float = 0.5,
     bad: int = 0, missing: int = 0, gamma: float = 6.0, e: float = 0.4, omega0: float = 18.0, slices: int = 20,
     duration: float = 0.5, model: str = "free-flight", theta0: float | None = None, hand: float = 0.3,
+    swings: bool = False,
 ) -> Clip:  # fmt: skip
-    """Return a clip; ``tilt`` in degrees, ``bad`` clicks and ``missing`` points fall on frames in flight."""
+    """Return a clip; ``tilt`` in degrees, ``bad`` clicks and ``missing`` points fall on frames in flight.
+
+    The hand accelerates steadily, or as ``swung`` says.
+    """
     theta0 = float(rng.uniform(1.2, 1.9)) if theta0 is None else theta0
     scene = Scenario(water_mass=filling, omega0=omega0, theta0=theta0, restitution=e, duration=duration)
     scene = scene.with_slices(slices)
@@ -41,12 +45,16 @@ def film(
     length, g = scene.bottle.length, 9.81
     velocity = np.array([rng.uniform(-0.8, 0.8), rng.uniform(2.0, 2.8)])
     # In the hand: other accelerations, which end at the release; place, velocity and turning meet the flight.
-    pull, twist = rng.uniform(-1, 1, 2) * (15, 5) + (0, 15), rng.uniform(-80, 80)
+    if swings:
+        pull, twist = swung(rng, tau)
+    else:
+        steady, bend = rng.uniform(-1, 1, 2) * (15, 5) + (0, 15), rng.uniform(-80, 80)
+        pull, twist = np.outer(tau**2, steady) / 2, bend * tau**2 / 2
     theta, mass = np.empty(len(t)), np.empty((len(t), 2))
     before, after = tau < 0, tau > duration
-    theta[before] = theta0 + omega0 * tau[before] + twist * tau[before] ** 2 / 2
+    theta[before] = theta0 + omega0 * tau[before] + twist[before]
     theta[flying] = run.theta[1:-1]
-    mass[before] = np.outer(tau[before], velocity) + np.outer(tau[before] ** 2, pull) / 2
+    mass[before] = np.outer(tau[before], velocity) + pull[before]
     mass[~before] = np.outer(tau[~before], velocity) - np.outer(tau[~before] ** 2, (0, g)) / 2
     r = np.full(len(t), run.r_cm[0])
     r[flying], r[after] = run.r_cm[1:-1], run.r_cm[-1]
@@ -72,6 +80,29 @@ def film(
     truth = {"gamma": gamma, "restitution": e, "omega0": omega0, "theta0": theta0, "release": release, "tilt": tilt,
              "touch": release + duration, "noise": noise, "g": g}  # fmt: skip
     return Clip(t, cap, base, truth)
+
+
+def swung(rng: np.random.Generator, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a hand adds to an even motion before the release: to C_M (P, 2) [m] and to theta (P,) [rad].
+
+    One of three hands: steady accelerations; accelerations that swing with periods of 0.15 to 0.6 s, whatever they are
+    at the release; and such that fade before it, as of a hand that has done its work.
+    """
+    size = np.array([15.0, 15.0, 80.0])  # of accelerations [m/s^2], [m/s^2], [rad/s^2]
+    level, swing = rng.uniform(-1, 1, (2, 3)) * size
+    phase, period = rng.uniform(0, 2 * np.pi, 3), rng.uniform(0.15, 0.6, 3)
+    kind = rng.integers(3)
+    if kind == 0:
+        added = level * tau[:, None] ** 2 / 2
+    else:
+        rate = 2 * np.pi / period
+        turned = rate * tau[:, None] + phase
+        waves = swing / rate**2 * (np.cos(phase) - rate * tau[:, None] * np.sin(phase) - np.cos(turned))
+        added = level * tau[:, None] ** 2 / 2 + waves
+        if kind == 2:  # both place and velocity are kept where the factor ends at 0 with its slope
+            added *= 1 - np.exp(-((tau[:, None] / 0.05) ** 2))
+    added[:, 1] += 7.5 * tau**2
+    return added[:, :2], added[:, 2]
 
 
 def spoiled(rng: np.random.Generator, film: Film) -> Film:

@@ -54,7 +54,7 @@ def film_of(made: film_simulator.Clip) -> Film:
 def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int) -> film_simulator.Clip:
     """Return a film of a cell with a truth drawn anew."""
     truth: dict[str, Any] = {"gamma": rng.uniform(2, 10), "e": rng.uniform(0.1, 0.8), "omega0": rng.uniform(14, 22)}
-    return film_simulator.film(rng, slices=slices, **cell, **truth)
+    return film_simulator.film(rng, slices=slices, swings=True, **cell, **truth)
 
 
 def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
