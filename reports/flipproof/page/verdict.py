@@ -290,7 +290,6 @@ SHARES: Final[Mapping[str, str]] = {
     "mean_eq8": "solvers/eq8/plateau",
     "mean_free": "solvers/free-flight/plateau",
     "agreement": "findings/agreement/value",
-    "overlap": "water/equations/free-flight/fillings/1/plateau",
     "engine_gravity": "findings/engine-gravity/value",
     "second_eq8": "findings/reference-eq8/value",
     "second_free": "findings/reference-free-flight/value",
@@ -313,7 +312,7 @@ PLAIN: Final[Mapping[str, str]] = {
 
 WATER: Final = {
     f"{name}_{word}": f"water/{place}"
-    for word, filling in (("half", "0.5"), ("three", "0.75"))
+    for word, filling in (("half", "0.5"), ("three", "0.75"), ("full", "1"))
     for name, place in {
         "low": f"fluids/{filling}/low",
         "high": f"fluids/{filling}/high",
@@ -411,7 +410,7 @@ def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
 
 
 def _water(summary: Summary) -> SimpleNamespace | None:
-    """Return the plateaus of fluids, rods and free flight, half and three quarters full; None if any is missing."""
+    """Return the plateaus of fluids, rods and free flight, half to all full; None if any is missing."""
     numbers = {name: summary.number(source, percent) for name, source in WATER.items()}
     for name, solver in (("rods", "rods"), ("free", "free-flight")):
         numbers[f"{name}_off"] = summary.number(f"findings/water-{solver}/value", small)
