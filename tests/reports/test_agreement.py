@@ -29,6 +29,11 @@ def test_those_within_their_bands_agree():
     assert found.pair("a", "c").bands == pytest.approx(2e-3)
 
 
+def test_a_few_times_outside_are_said():
+    found = matrix(0.0, np.where(np.arange(len(T)) < len(T) // 25, 1.0, 0.0))
+    assert found.words == "all agree within their bands at 96 % of the times or more"
+
+
 @pytest.mark.parametrize(("shifts", "odd"), [((1.0, 0.0, 0.0), "a"), ((0.0, 1.0, 0.0), "b"), ((0.0, 0.0, -1.0), "c")])
 def test_the_one_that_stands_alone_is_named(shifts, odd):
     found = matrix(*shifts)
