@@ -8,7 +8,9 @@ anywhere in the picture. In flight v = sigma^2. Before the release a hand adds K
 C_M and to theta, which are fitted, since what a hand does in one frame it does in the next; the power after these has
 the size A, and after the touch the table takes the velocity:
 
-    v = sigma^2 + (A tau^(K+2)/(K+2)!)^2  before,    v = sigma^2 + (V (t - t_d))^2  after,  never beyond the picture.
+    v = sigma^2 + (A tau^(K+2)/((K+2)! QUICK^K))^2  before,    v = sigma^2 + (V (t - t_d))^2  after,
+
+never beyond the picture.
 
 So frames in the hand and on the table count for nothing but for this: release and touch do not jump. A table of theta
 or omega alone has rows of one coordinate, no hand and no table.
@@ -165,6 +167,7 @@ class Likelihood:
         self.index = {name: k for k, name in enumerate(self.names)}
         self.log_bad = float(np.log(BAD / self.area))
         self.expected, self.stiffness = self._priors()
+        # Ten that place the flight and three accelerations of a hand; its other powers follow their priors.
         fixed = [held.release is not None, self.two and held.tilt, self.two and held.scale]
         self.degrees = (13 if self.two else 3) - sum(fixed)
 

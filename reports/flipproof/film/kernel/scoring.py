@@ -2,7 +2,7 @@
 
 A fit of a film asks these some ten thousand times, for a few dozen frames each, where NumPy's calls take longer than
 their arithmetic. Names and shapes are those of ``curves`` and ``likelihood``: P frames, B bodies, D coordinates, K
-inner parameters in the order of ``likelihood.POINTS``.
+inner parameters in the order of ``Film.names``.
 """
 
 import math
