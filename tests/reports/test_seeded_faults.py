@@ -5,6 +5,7 @@ import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 
+import faults
 import numpy as np
 import pytest
 
@@ -19,6 +20,11 @@ from slicemodel import Scenario
 TESTS = Path(__file__).resolve().parents[1]
 THROW = dataclasses.replace(Scenario().with_slices(4), duration=0.25)
 STEPS = 40
+
+
+def test_every_fault_of_the_benchmark_has_its_line():
+    for file, sound, *_ in faults.FAULTS:
+        assert (TESTS.parent / file).read_text(encoding="utf-8").count(sound) == 1, (file, sound)
 
 
 def drop_the_origin(monkeypatch):
