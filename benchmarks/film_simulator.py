@@ -91,16 +91,13 @@ def swung(rng: np.random.Generator, tau: np.ndarray) -> tuple[np.ndarray, np.nda
     size = np.array([15.0, 15.0, 80.0])  # of accelerations [m/s^2], [m/s^2], [rad/s^2]
     level, swing = rng.uniform(-1, 1, (2, 3)) * size
     phase, period = rng.uniform(0, 2 * np.pi, 3), rng.uniform(0.15, 0.6, 3)
-    kind = rng.integers(3)
-    if kind == 0:
-        added = level * tau[:, None] ** 2 / 2
-    else:
+    kind, t = rng.integers(3), tau[:, None]
+    added = level * t**2 / 2
+    if kind > 0:
         rate = 2 * np.pi / period
-        turned = rate * tau[:, None] + phase
-        waves = swing / rate**2 * (np.cos(phase) - rate * tau[:, None] * np.sin(phase) - np.cos(turned))
-        added = level * tau[:, None] ** 2 / 2 + waves
-        if kind == 2:  # both place and velocity are kept where the factor ends at 0 with its slope
-            added *= 1 - np.exp(-((tau[:, None] / 0.05) ** 2))
+        added += swing / rate**2 * (np.cos(phase) - rate * t * np.sin(phase) - np.cos(rate * t + phase))
+    if kind == 2:
+        added *= 1 - np.exp(-((t / 0.05) ** 2))
     added[:, 1] += 7.5 * tau**2
     return added[:, :2], added[:, 2]
 

@@ -353,7 +353,6 @@ def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> 
     rates = np.array([(SCALE * np.sinh(a * np.arcsinh(MAX_RATE / SCALE)), e) for a, e in product(*axes)])
     best: tuple[float, Likelihood, FloatArray] | None = None
     flown: list[Curve | None] = []
-    film = starts[0][0].film
     for start, x in starts:
         if not flown or equation.weighted:
             flown = equation.curves(rates, float(x[2]), float(x[1]))
@@ -363,7 +362,7 @@ def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> 
             for _ in range(2):
                 again = likelihood.fitted(curve, fit.x)
                 likelihood = settle(likelihood, curve, again.x)
-            cost = again.cost + (_implausible(film, again.x) if start.two else 0.0)
+            cost = again.cost + (_implausible(start.film, again.x) if start.two else 0.0)
             if best is None or cost < best[0]:
                 best = cost, likelihood, again.x
     return starts[0] if best is None else best[1:]
@@ -572,7 +571,7 @@ def _implausible(film: Film, x: FloatArray) -> float:
     Either is bounded: a clock or a stick far off is found, too, and water that no curve of a first guess describes.
     """
     gravity = math.log(math.hypot(x[7], x[8]) / GRAVITY) / 0.1
-    misses = max(0.0, float(x[-2]) - math.log(3.0 * film.scatter + 1e-6)) / 0.2
+    misses = max(0.0, float(x[-2]) - math.log(3.0 * film.scatter() + 1e-6)) / 0.2
     return min(100.0, 0.5 * gravity**2) + min(100.0, 0.5 * misses**2)
 
 

@@ -87,8 +87,7 @@ class Judged:
         film = self.estimate.film
         if film.quantity != "points":
             return third_differences(film.values[0][self.flying, 0])
-        apart = np.hypot(*(film.values[1] - film.values[0])[self.flying].T)
-        return 1.4826 * float(np.median(np.abs(apart - np.median(apart)))) / math.sqrt(2.0)
+        return film.scatter(self.flying)
 
     @cached_property
     def runs(self) -> float:

@@ -99,10 +99,9 @@ class Film:
         span = np.nanmax(seen, axis=0) - np.nanmin(seen, axis=0)
         return float(np.prod(np.maximum(span, 1e-3 * max(1e-6, float(span.max())))))
 
-    @property
-    def scatter(self) -> float:
-        """Noise of a click by the scatter of the bottle's clicked length, which needs no equation [m]."""
-        length = np.hypot(*(self.values[1] - self.values[0]).T)
+    def scatter(self, frames: NDArray[np.bool_] | slice = slice(None)) -> float:
+        """Return the noise of a click by the scatter of the bottle's clicked length, which needs no equation [m]."""
+        length = np.hypot(*(self.values[1] - self.values[0])[frames].T)
         return 1.4826 * float(np.nanmedian(np.abs(length - np.nanmedian(length)))) / float(np.sqrt(2.0))
 
     @property

@@ -115,8 +115,9 @@ def study_agreement(
 def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
     apart = [{pair.first, pair.second} for pair in pairs if not pair.agree]
     if not apart:
-        least = 100.0 * min(pair.share for pair in pairs)
-        return f"all agree within their bands{f' at {least:.0f} % of the times or more' if least < 100.0 else ''}"
+        least = min(pair.share for pair in pairs)
+        times = "" if least == 1.0 else f" at {math.floor(100.0 * least)} % of the times or more"
+        return f"all agree within their bands{times}"
     alone = [name for name in names if all(name in two for two in apart)]
     if len(alone) == 1:
         return f"all but {alone[0]} agree within their bands"
