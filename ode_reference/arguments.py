@@ -7,8 +7,10 @@ import numbers
 from collections.abc import Collection
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from slicemodel.scenario import unknown_name
+from slicemodel.scenario import Scenario, unknown_name
+from slicemodel.trajectory import FloatArray
 
 
 def known_name(what: str, name: object, known: Collection[str]) -> str:
@@ -40,6 +42,19 @@ def number_within(name: str, value: object, least: float, most: float = math.inf
         upper = f"{most:g}]" if most < math.inf else "inf)"
         raise ValueError(f"{name} = {value!r}{unit} is outside [{least:g}, {upper}{unit}")
     return number
+
+
+def velocities_of(scenario: Scenario, speeds: ArrayLike) -> FloatArray:
+    """Return ``speeds`` as an array if they are N finite numbers, of slices that can move; else raise ValueError."""
+    try:
+        velocities = np.asarray(speeds, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"speeds = {speeds!r} are no numbers") from None
+    if velocities.shape != (scenario.n_slices,) or not np.isfinite(velocities).all():
+        raise ValueError(f"speeds = {speeds!r} are not {scenario.n_slices} finite numbers [m/s]")
+    if scenario.frozen and velocities.any():
+        raise ValueError(f"speeds = {speeds!r} m/s of frozen water: it does not move")
+    return velocities
 
 
 def _finite(value: object) -> float:

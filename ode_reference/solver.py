@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import known_name, number_within, true_or_false
+from ode_reference.arguments import known_name, number_within, true_or_false, velocities_of
 from ode_reference.combinations import is_ours, model_of, require_own_switches
 from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
@@ -84,6 +84,7 @@ def solve(
     energy: bool = False,
     twin: int = 0,
     own_inertia: bool = False,
+    speeds: ArrayLike | None = None,
 ) -> Trajectory:
     """Solve one equation of motion through all its rebounds, rests and releases.
 
@@ -125,6 +126,9 @@ def solve(
     own_inertia : bool
         Whether water has the moment of inertia of discs about their own diameters, M_w R^2/4 in all, which the paper
         leaves out by cutting it into points.
+    speeds : array, shape (N,), optional
+        Velocities of the slices in the bottle at release [m/s], towards the base; at rest by default. By "taylor" only:
+        it carries on a flight from a state of any other.
 
     Returns
     -------
@@ -175,7 +179,7 @@ def solve(
     if true_or_false("own_inertia", own_inertia):
         run = solve(
             with_own_inertia(scenario), model, times, method=method, rtol=rtol, atol=atol, max_step=max_step,
-            rest_speed=rest_speed, impact_law=impact_law, energy=energy, twin=twin,
+            rest_speed=rest_speed, impact_law=impact_law, energy=energy, twin=twin, speeds=speeds,
         )  # fmt: skip
         return replace(run, scenario=scenario, settings={**run.settings, "own_inertia": True})
     if isinstance(model, str) and model in WATERS:
@@ -188,6 +192,8 @@ def solve(
     t_out = output_times(scenario, times)
     check_states(scenario.n_slices, len(t_out), "cut it coarser, or ask for fewer times")
     if method != TAYLOR:
+        if speeds is not None:
+            raise ValueError(f"speeds cannot be asked of method {method!r}: leave them out, or choose 'taylor'")
         from ode_reference import witness
 
         return witness.integrate(
@@ -203,7 +209,11 @@ def solve(
     require_own_switches(chosen, scenario)
     from ode_reference.flow import api
 
-    return api.fly(scenario, t_out, chosen.switches, _settings(chosen, speed, impact_law, energy, twin))
+    settings = _settings(chosen, speed, impact_law, energy, twin)
+    if speeds is None:
+        return api.fly(scenario, t_out, chosen.switches, settings)
+    velocities = velocities_of(scenario, speeds)
+    return api.fly(scenario, t_out, chosen.switches, settings | {"speeds": velocities.tolist()}, speeds=velocities)
 
 
 def with_own_inertia(scenario: Scenario) -> Scenario:

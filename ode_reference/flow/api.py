@@ -25,7 +25,13 @@ STATUSES: Final = {OK: "ok", OVERFLOW: "overflow", STALLED: "stalled", EXHAUSTED
 
 
 def fly(
-    scenario: Scenario, t_out: FloatArray, switches: Switches, settings: Mapping[str, Any], *, states: bool = True
+    scenario: Scenario,
+    t_out: FloatArray,
+    switches: Switches,
+    settings: Mapping[str, Any],
+    *,
+    states: bool = True,
+    speeds: FloatArray | float = 0.0,
 ) -> Trajectory:
     """Fly one scenario.
 
@@ -34,13 +40,14 @@ def fly(
     t_out : array, shape (P,) - output times [s]
     settings : mapping - "model", the name of the equation; "rest_speed" [m/s], "impact_law", "energy"
     states : bool - whether r and v are kept
+    speeds : array, shape (N,) - velocities of the slices at release [m/s]
     """
     half, points = scenario.bottle.length / 2, len(t_out)
     thrown, moved = twin_of(scenario, settings.get("twin", 0))
     rows, (y, v) = np.empty((3, points)), np.empty((2, points * states, scenario.n_slices))
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
     with np.errstate(all="ignore"):
-        flight, places, marks = layout.prepare(thrown, switches, settings, moved)
+        flight, places, marks = layout.prepare(thrown, switches, settings, moved, speeds)
         now = flight[0]
         if scenario.frozen or 2 * (scenario.r_max - half) <= now.tolerance:
             hits = _hold(now, places[layout.PLACE], t_out, rows)

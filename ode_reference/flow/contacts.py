@@ -48,7 +48,8 @@ def touch(now, points, marks):
         j = marks[NEAR, k]
         y, v = where(now, points, j)
         end, gap = math.copysign(1.0, y), now.wall - abs(y)
-        strikes = (end * v > standing or now.steps == 0) and gap <= max(now.tolerance, 9e-16 * now.t * abs(v))
+        approaches = end * v > standing or (now.steps == 0 and end * v >= -standing)
+        strikes = approaches and gap <= max(now.tolerance, 9e-16 * now.t * abs(v))
         if strikes or j == now.struck:
             add(now, points, marks, j, end, 1, end * v if end * v > standing else 0.0)
             now.largest_snap = max(now.largest_snap, abs(gap))

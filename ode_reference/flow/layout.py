@@ -73,11 +73,15 @@ all that rest on its end."""
 
 
 def prepare(
-    scenario: Scenario, switches: Switches, settings: Mapping[str, Any], moved: FloatArray | float = 0.0
+    scenario: Scenario,
+    switches: Switches,
+    settings: Mapping[str, Any],
+    moved: FloatArray | float = 0.0,
+    speeds: FloatArray | float = 0.0,
 ) -> tuple[NDArray[Any], FloatArray, IntArray]:
     """Return the record of a flight at its release, shape (1,), with ``points``, (6, N), and ``marks``, (3, N).
 
-    ``moved`` is by how much the slices are off their places, shape (N,) [m].
+    ``moved`` is by how much the slices are off their places, shape (N,) [m]; ``speeds`` theirs [m/s].
     """
     throw, n = Throw.of(scenario), scenario.n_slices
     flight = np.zeros(1, dtype=RECORD).view(np.recarray)
@@ -96,7 +100,8 @@ def prepare(
     now.sequential = settings["impact_law"] == "sequential" and switches.recoil
     stacked = type(scenario).initial_positions is Scenario.initial_positions  # else let go elsewhere than Eq. 3a says
     # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
-    now.mirrored = stacked and scenario.fill_fraction == 1.0 and now.gravity == 0.0 and not now.sequential
+    full = stacked and scenario.fill_fraction == 1.0 and not np.any(speeds)
+    now.mirrored = full and now.gravity == 0.0 and not now.sequential
     now.ledger, now.step_limit, now.watch = settings["energy"], STEP_LIMIT, WATCH
     now.impact_limit = messages.max_impacts(n)
     now.theta, now.A, now.dB = scenario.theta0, 1.0, 1.0
@@ -107,6 +112,7 @@ def prepare(
     if not stacked:
         points[PLACE] = scenario.initial_positions() - scenario.bottle.length / 2
     points[PLACE] += moved
+    points[SPEED] = speeds
     return flight, points, marks
 
 

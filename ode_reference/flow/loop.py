@@ -34,14 +34,14 @@ def fly(flight, points, marks, t_out, rows, r, v):
     now = flight[0]
     impacts, table = np.empty((64, 6)), np.zeros((ROWS + 1, MOST + 1))
     for i in range(points.shape[1]):
-        enter(now, points, i, points[PLACE, i], 0.0)
+        enter(now, points, i, points[PLACE, i], points[SPEED, i])
     set_body(now)
     if not math.isfinite(now.momentum) or not math.isfinite(now.momentum * now.momentum / inertia_of(now)):
         now.status = OVERFLOW
     now.initial = energy_of(now, points, marks)
     now.pace = now.duration
     gather(now, points, marks, now.duration)
-    # Who touches an end at release is in contact, though it has no speed.
+    # Who touches an end at release is in contact, though it has no speed, unless it leaves.
     now.struck = -1
     touch(now, points, marks)
     while now.status == 0:

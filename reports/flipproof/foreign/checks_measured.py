@@ -11,10 +11,10 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.curves.order import observed_order
-from flipproof.foreign import elsewhere
+from flipproof.foreign import departures, elsewhere
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
-from flipproof.foreign.place import curve, placing
+from flipproof.foreign.place import curve, name_of, placing, switches_of
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -266,6 +266,36 @@ def _singles(answer: Answer) -> list[str]:
             if np.all(np.abs(values - nearest) <= 0.1 * np.spacing(np.abs(nearest))):
                 names.append(name)
     return names
+
+
+# ---------------------------------------------------------------------- from output to output
+
+PIECES: Final = (
+    elsewhere.WHOLE,
+    elsewhere.STICKY,
+    elsewhere.RESTLESS,
+    replace(elsewhere.WHOLE, gravity=0.0, damping=0.0, angle=5.0),
+)
+"""Throws with and without weight, drag, impacts and rests on both ends."""
+
+
+def check_piecewise(traits: Traits) -> Making:
+    """From the solver's own state at each output the equation leads to the next."""
+    place = yield from placing(traits)
+    equation = traits.equation or place.equation
+    declared = name_of(switches_of(equation))
+    if place.on_lattice and place.equation != declared:
+        raise NotApplicableError("told by the check of the equation")
+    if traits.equation is None and not place.on_lattice:
+        raise NotApplicableError("no equation is declared")
+    came, advice = yield from departures.departing(traits, declared, [knobs.ask(0) for knobs in PIECES])
+    return Found(
+        holds=not came,
+        expected=f"{declared} from one output to the next",
+        came=f"departs {came}" if came else "no departure beyond the step's own error",
+        where=f"{len(PIECES)} throws, begun anew from the solver's own state at each of {departures.OUTPUTS} outputs",
+        advice=advice,
+    )
 
 
 # ---------------------------------------------------------------------- restitution

@@ -28,6 +28,7 @@ import numpy as np
 import ode_reference
 from flipproof.foreign.checking import THROW, Found, Making, NotApplicableError, effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
+from flipproof.foreign.departures import departing
 from flipproof.foreign.place import name_of, placing, switches_of
 from flipproof.frame.twins import usual_rest_speed
 from ode_reference.switches import Switches
@@ -560,6 +561,10 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
         came = f"at most {largest:.2g} of omega_0 off, its own error {own:.2g}"
         return Found(holds=True, expected=expected, came=came, weak=words, facts=facts)
     came, advice = yield from bisected(traits, *wrong[0], seed, equation, unrefined)
+    if not (wrong[0][0].frozen or wrong[0][1].error):
+        with suppress(ForeignError, NotApplicableError):
+            pieces, what = yield from departing(traits, equation, [wrong[0][0].ask(seed)])
+            advice = f"{pieces and f'there it departs {pieces}; '}{what and f'{what}; '}{advice}"
     where = f"{len(wrong)} of {len(flights)} throws"
     return Found(holds=False, expected=expected, came=came, where=where, advice=advice, facts=facts)
 

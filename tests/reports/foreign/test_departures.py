@@ -1,0 +1,148 @@
+"""The reference, begun anew from a solver's own states, says in which intervals that solver departs, and by what."""
+
+from dataclasses import replace
+
+import pytest
+from planted import InProcess, patches
+
+import ode_reference
+from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
+from flipproof.foreign.checking import NotApplicableError, drive
+from flipproof.foreign.contract import started
+from flipproof.foreign.departures import departing
+from flipproof.foreign.elsewhere import STICKY, WHOLE
+from slicemodel.observables import moment_of_inertia
+
+
+class Exact:
+    """The reference as somebody's solver, thrown with another scenario than the one asked."""
+
+    equation = "eq8"
+    refined_by = "dt"
+
+    def thrown(self, throw):
+        return throw
+
+    def spoilt(self, _throw, flight):
+        return flight
+
+    def solve(self, ask):
+        throw = started(ask)
+        flight = ode_reference.solve(self.thrown(throw), self.equation, ask.times)
+        answer = {name: getattr(flight, name).copy() for name in ("t", "theta", "omega", "r", "v")}
+        return self.spoilt(throw, answer)
+
+
+def told(kind, *throws, **traits):
+    solver = InProcess(type("Kind", (kind,), traits)(), "x")
+    return " / ".join(drive(departing(solver.traits, solver.traits.equation, [t.ask(0) for t in throws]), solver))
+
+
+@pytest.mark.parametrize("equation", ["eq8", "published-limit", "free-flight"])
+@pytest.mark.parametrize("refined_by", ["dt", None])
+def test_the_reference_departs_nowhere(equation, refined_by):
+    assert told(Exact, WHOLE, STICKY, equation=equation, refined_by=refined_by) == " / "
+
+
+WEIGHTLESS = replace(WHOLE, gravity=0.0)
+BOUNCING = replace(WEIGHTLESS, damping=0.0, angle=5.0)
+
+
+@pytest.mark.parametrize(
+    ("thrown", "besides", "words"),
+    [
+        (
+            lambda _, throw: replace(throw, gravity=0.9 * throw.gravity),
+            WEIGHTLESS,
+            ["where there is weight", "-0.1 x g cos(theta) besides"],
+        ),
+        (
+            lambda _, throw: replace(throw, drag=1.1 * throw.drag),
+            replace(WHOLE, damping=0.0),
+            ["where there is drag", "x the drag alpha v / m and +", "x the drag alpha v_CM / m besides"],
+        ),
+        (
+            lambda _, throw: replace(throw, restitution=0.9 * throw.restitution),
+            BOUNCING,
+            ["with an impact, in none of", "of its right speed, the others are right"],
+        ),
+    ],
+)
+def test_a_term_or_an_impact_that_is_wrong_is_named_with_its_factor(thrown, besides, words):
+    line = told(Exact, WHOLE, besides, thrown=thrown)
+    for part in words:
+        assert part in line
+
+
+def half_of_own_inertia(_, throw, flight):
+    bottle = throw.bottle
+    own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+    inertia = moment_of_inertia(throw, flight["r"]) - own / 2
+    return flight | {"omega": throw.omega0 * inertia[0] / inertia}
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "words"),
+    [
+        (
+            lambda _, throw, flight: flight | {"theta": throw.theta0 + 1.01 * (flight["theta"] - throw.theta0)},
+            "theta advances by 1.01 of the integral of omega",
+        ),
+        (half_of_own_inertia, "in which M_b (R^2/2 + L^2/12) counts 0.5 times"),
+    ],
+)
+def test_an_answer_that_is_wrong_is_named(spoilt, words):
+    assert words in told(Exact, WHOLE, spoilt=spoilt)
+
+
+def test_rests_that_end_late_are_told_from_all_else():
+    held = replace(
+        patches("right")["eq8_as_switches"],
+        base="eq8",
+        changes=(
+            (
+                "            if after < -1e-7:\n",
+                "            self.lifted = getattr(self, 'lifted', self.t) if after < -1e-7 else self.t + used\n"
+                "            if after < -1e-7 and self.t + used - self.lifted >= 0.007:\n",
+            ),
+        ),
+    )
+    solve = held.solver()
+
+    class Held(Exact):
+        refined_by = None
+
+        def solve(self, ask):
+            return solve(replace(ask, effort=ask.scenario.duration / 1000))
+
+    assert "look at when a slice at rest is let go" in told(Held, WHOLE, STICKY)
+
+
+def test_a_solver_without_speeds_is_not_asked():
+    with pytest.raises(NotApplicableError):
+        told(Exact, WHOLE, spoilt=lambda _, __, flight: {name: flight[name] for name in ("t", "theta", "omega")})
+
+
+class FreeFlightDeclared(Exact):
+    """Eq. 8, declared as free flight."""
+
+    def solve(self, ask):
+        return Exact().solve(ask)
+
+    equation = "free-flight"
+
+
+def test_the_check_leaves_a_wrong_declaration_to_that_of_the_equation():
+    good, other = (certify(InProcess(kind(), "x"), ["piecewise"]).results[0] for kind in (Exact, FreeFlightDeclared))
+    assert (good.verdict, other.verdict) == (PASSED, IDLE)
+
+
+def test_the_check_fails_where_the_solver_departs():
+    class WeakWeight(Exact):
+        def thrown(self, throw):
+            return replace(throw, gravity=0.98 * throw.gravity)
+
+    (result,) = certify(InProcess(WeakWeight(), "x"), ["piecewise"]).results
+    assert result.verdict == FAILED
+    assert "departs in" in result.line
+    assert "-0.02 x g cos(theta) besides" in result.line
