@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import ode_reference
 from flipproof.foreign.checking import NotApplicableError, effort_of
-from flipproof.foreign.contract import Answer, Ask, Started, Traits
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Started, Traits
 from flipproof.foreign.place import switches_of
 from flipproof.frame.twins import usual_rest_speed
 from slicemodel.observables import centre_of_mass, moment_of_inertia
@@ -192,30 +192,40 @@ def departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> Departing:
     if traits.refined_by is None:
         intervals = yield from _flown(traits, equation, asks, 0)
         astray = _astray(traits, intervals, None)
-    else:
-        coarse = yield from _flown(traits, equation, asks, LEVELS[0])
-        for level in LEVELS[1:]:  # what fails at long steps, or at capped ones, need not fail at short ones
+        return _told(equation, intervals, astray) if astray.sum() >= FEW else ("", "")
+    coarse: list[Interval] = []
+    for level in LEVELS:
+        try:
             intervals = yield from _flown(traits, equation, asks, level)
-            astray = _astray(traits, intervals, coarse)
-            if astray.sum() < FEW:
-                break
-            coarse = intervals
-    return _told(equation, intervals, astray) if astray.sum() >= FEW else ("", "")
+        except ForeignError:
+            if coarse:  # too slow for so fine steps
+                return "", ""
+            if level == LEVELS[-1]:
+                raise
+            continue
+        if coarse and (astray := _astray(traits, intervals, coarse)).sum() < FEW:
+            return "", ""
+        coarse = intervals
+    return _told(equation, intervals, astray)
 
 
 def _flown(
     traits: Traits, equation: str, asks: Sequence[Ask], level: float
 ) -> Generator[Sequence[Ask], Sequence[Answer], list[Interval]]:
     """Ask for throws at one level, and carry on from the state at each output to the next."""
-    intervals: list[Interval] = []
-    for number, ask in enumerate(asks):
+    dense = []
+    for ask in asks:
         times = np.linspace(0.0, ask.scenario.duration, OUTPUTS + 1)
         times.setflags(write=False)
-        (answer,) = yield [replace(ask, times=times, effort=effort_of(traits, ask.scenario, level))]
-        if answer.r is None or answer.v is None:
-            raise NotApplicableError("r or v is not given")
-        intervals += _intervals(equation, number, ask, answer)
-    return intervals
+        dense.append(replace(ask, times=times, effort=effort_of(traits, ask.scenario, level)))
+    answers = yield dense
+    if any(answer.r is None or answer.v is None for answer in answers):
+        raise NotApplicableError("r or v is not given")
+    return [
+        interval
+        for number, (ask, answer) in enumerate(zip(dense, answers, strict=True))
+        for interval in _intervals(equation, number, ask, answer)
+    ]
 
 
 def _intervals(equation: str, number: int, ask: Ask, answer: Answer) -> list[Interval]:
@@ -515,4 +525,8 @@ def _of_motion(intervals: Sequence[Interval]) -> str:
         for k in range(flying[0].throw.n_slices)
         if _rms([(i.v[1] - i.due["v"])[k] for i in flying if len(i.due["v"]) > k]) > 1e-3 * size
     ]
-    return f"slice {who[0]} alone is off" if len(who) == 1 and flying[0].throw.n_slices > 1 else ""
+    return (
+        f"slice {who[0]} alone is off: look at what is done to it alone, as by a loop over slices"
+        if len(who) == 1 and flying[0].throw.n_slices > 1
+        else ""
+    )

@@ -320,8 +320,7 @@ class Judged:
     """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
 
     ``own`` is the solver's own error of omega where it was judged, ``error`` says why there is no answer, ``since``
-    up to which impact it is right, ``passed`` how many impacts that are, ``alone`` which slice is the first to be
-    wrong, if it is a single one, and ``astray`` the slices that are then farthest off, within a factor of five.
+    up to which impact it is right, and ``passed`` how many impacts that are.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
@@ -331,8 +330,6 @@ class Judged:
     error: str = ""
     since: str = ""
     passed: int = 0
-    alone: str = ""
-    astray: tuple[int, ...] = ()
 
     @property
     def farthest(self) -> float:
@@ -370,8 +367,7 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         rooms[name] = floor + OWN * owns[name] + BAND * sum(summed(sizes(truth, twin, name)) for twin in twins)
     clear = rooms["omega"] <= BLURRED
     wrong: dict[str, tuple[float, float, float]] = {}
-    first, alone = float(ask.times[-1]), ""
-    astray: tuple[int, ...] = ()
+    first = float(ask.times[-1])
     for name in given:
         off = sizes(mine, truth, name)[clear]
         room = rooms[name][clear]
@@ -387,9 +383,6 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
             wrong[name] = float(rows[k]), float(room[k]), float(ask.times[k])
             row = int(np.argmax(rows > room))
             first = min(first, float(ask.times[:reached][clear][row]))
-            if name == "r" and ask.scenario.n_slices > 1:
-                astray = tuple(np.flatnonzero(off[row] > max(room[row], off[row].max() / 5)).tolist())
-                alone = f", slice {astray[0]} alone" if np.count_nonzero(off[row] > room[row]) == 1 else ""
     if mine.impacts is not None and clear.any():
         room_of_r = rooms.get("r", rooms["omega"])[clear]
         if late := _unmatched(ask, mine.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]):
@@ -402,8 +395,6 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
         share=float(np.mean(clear)) * reached / len(ask.times),
         since=onset,
         passed=passed,
-        alone=alone,
-        astray=astray,
     )
 
 
@@ -655,7 +646,7 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
     }
     others = yield from judging(traits, list(simpler.values()), 0, equation, unrefined)
     right = {name for name, judged in zip(simpler, others, strict=True) if not judged.wrong}
-    onset = f"with all of it first wrong {first.since}{first.alone}; "
+    onset = f"with all of it first wrong {first.since}; "
     if {"weight", "impacts"} <= right:
         if "rests" in right:
             return f"right without weight, and without rests: look at {LOOK_AT['rests']}; {onset}"
@@ -673,10 +664,6 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
     (apart,) = yield from judging(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
     if not apart.wrong:
         return f"{too}, but right with every slice far from the ends: look at the places of the ends, and at rests; "
-    astray = dict(zip(simpler, others, strict=True))["all"].astray
-    if 0 < len(astray) < whole.slices:
-        which = f"slice {', '.join(map(str, astray))} first"
-        return f"{too}, {which}: look at what is done to it alone, as by a loop over slices that misses one; "
     return f"{too}: look at the centrifugal term omega^2 (r - r_cm), the inertia and the masses; "
 
 
@@ -690,7 +677,7 @@ def _wrong_words(judged: Judged) -> str:
     unit = {**units, "impacts": "the flight"}.get(worst[0], "L")
     also = f", and {', '.join(worst[1:])}" if len(worst) > 1 else ""
     is_off = f"{'are' if worst[0] == 'impacts' else 'is'} {off:.2g} of {unit} off (room {room:.1g})"
-    onset = f", first {judged.since}{judged.alone}" if judged.since else ""
+    onset = f", first {judged.since}" if judged.since else ""
     return f"{worst[0]} {is_off} at t = {time:.3g} s{also}{onset}"
 
 

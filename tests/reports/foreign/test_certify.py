@@ -164,7 +164,7 @@ SEES = {
 """Check -> a mistake that it sees; "elsewhere" has tests of its own."""
 
 
-LONG = ("restitution", "order-across-impacts", "equation", "gravity", "elsewhere", "published-vectors")
+LONG = ("piecewise", "restitution", "order-across-impacts", "equation", "gravity", "elsewhere", "published-vectors")
 """Checks that ``benchmarks/power.py`` makes of the good solver, and ``test_our_own_solvers_pass`` of faster ones."""
 
 
@@ -599,7 +599,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("closed_form_momentum_remembered", "start", "compute J_0 from ask.start"),
         ("at_most_two_hundred_steps", "times", "right where outputs lie close: look at what goes on between two"),
         ("rest_from_a_fiftieth", "refinement", "right through impacts as long as no slice rests: look at rests"),
-        ("last_slice_forgotten", "equation", "slice 3 first: look at what is done to it alone"),
+        ("last_slice_forgotten", "piecewise", "slice 3 alone is off: look at what is done to it alone"),
         ("throw_read_to_four_digits", "start", "theta_0 has only 4 digits: read the throw"),
         ("six_decimals", "definitions", "inertia has 6 decimals, which are few digits"),
         ("whole_steps_only", "angle", "theta stands still between two of the times asked"),
