@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 import ode_reference
 from ode_reference import ideal_water
 from slicemodel import Scenario
-from slicemodel.compiled import compiled
+from slicemodel.compiled import kept_on_disk
 from slicemodel.observables import plateau
 
 Floats = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Flight(NamedTuple):
     particles: int
 
 
-@compiled
+@kept_on_disk()
 def pairs_near(x: Floats, reach: float, size: float, head: Any, after: Any, pairs: Any) -> int:
     """Write the pairs nearer than ``reach`` into ``pairs``; return how many there are, even if they do not fit."""
     side = head.shape[0]
@@ -94,7 +94,7 @@ def pairs_near(x: Floats, reach: float, size: float, head: Any, after: Any, pair
     return count
 
 
-@compiled
+@kept_on_disk()
 def forces(x: Floats, v: Floats, body: Floats, shape: Floats, pairs: Any, rho: Floats, push: Floats) -> tuple[Any, ...]:
     """Write density and acceleration of the particles; return force and torque on the bottle, and the elastic energy.
 

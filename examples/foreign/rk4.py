@@ -24,11 +24,12 @@ class Eq8:
     def solve(self, ask):
         """Answer at the times asked, with steps of at most ``ask.effort`` seconds."""
         throw, bottle = ask.scenario, ask.scenario.bottle
-        n, m = throw.n_slices, throw.slice_mass
+        n, m, total_mass = throw.n_slices, throw.slice_mass, throw.total_mass
+        lowest, highest = throw.r_min, throw.r_max
         own_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
 
         def centre_and_inertia(r):
-            centre = (m * r.sum() + bottle.mass * bottle.length / 2) / throw.total_mass
+            centre = (m * r.sum() + bottle.mass * bottle.length / 2) / total_mass
             inertia = m * ((r - centre) ** 2).sum() + own_inertia + bottle.mass * (bottle.length / 2 - centre) ** 2
             return centre, inertia
 
@@ -39,17 +40,17 @@ class Eq8:
             centre, inertia = centre_and_inertia(r)
             omega = momentum / inertia
             a = omega**2 * (r - centre) + self.weight * throw.gravity * np.cos(theta)
-            a = a - self.drag * throw.drag / m * (v - m * v.sum() / throw.total_mass)
-            rests = ((r >= throw.r_max) & (a > 0) & (v >= 0)) | ((r <= throw.r_min) & (a < 0) & (v <= 0))
+            a = a - self.drag * throw.drag / m * (v - m * v.sum() / total_mass)
+            rests = ((r >= highest) & (a > 0) & (v >= 0)) | ((r <= lowest) & (a < 0) & (v <= 0))
             still = rests | throw.frozen
             return np.concatenate([[omega], np.where(still, 0.0, v), np.where(still, 0.0, a)])
 
         def rebound(y):
             r, v = y[1 : n + 1], y[n + 1 :]  # views: what changes here changes y
-            low, high = r < throw.r_min, r > throw.r_max
+            low, high = r < lowest, r > highest
             v[(high & (v > 0)) | (low & (v < 0))] *= -self.restitution * throw.restitution
             v[(low | high) & (np.abs(v) < 1e-3)] = 0.0
-            r[:] = np.clip(r, throw.r_min, throw.r_max)
+            r[:] = np.clip(r, lowest, highest)
 
         y = np.concatenate([[throw.theta0], ask.start, np.zeros(n)])
         t, rows = 0.0, []

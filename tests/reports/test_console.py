@@ -138,15 +138,15 @@ def test_what_is_echoed_is_cut(capsys):
         assert len(said) < 1500
 
 
-@pytest.mark.parametrize("endless", ["/dev/zero", "large.toml", "pipe"])
-def test_an_endless_scenario_ends_at_once(tmp_path, endless):
+def test_an_endless_scenario_ends_at_once(tmp_path):
     """One process makes all commands, since one that reads on would never come back."""
     os.mkfifo(tmp_path / "pipe")
     with (tmp_path / "large.toml").open("wb") as file:
         file.truncate(40 * 2**20)
-    track = ["track", endless, "--cap", "cap", "--base", "base", "--length-unit", "m"]
-    others = [["sweep", endless, "--out", "sweep"], ["fit", endless], track] if endless != "large.toml" else []
-    commands = [["simulate", endless], *others]
+    commands = [["simulate", "large.toml"]]
+    for endless in ("/dev/zero", "pipe"):
+        track = ["track", endless, "--cap", "cap", "--base", "base", "--length-unit", "m"]
+        commands += [["simulate", endless], ["sweep", endless, "--out", "sweep"], ["fit", endless], track]
     code = "import json, sys; from flipproof.cli.main import main; print([main(c) for c in json.loads(sys.argv[1])])"
     told = subprocess.run(
         [sys.executable, "-c", code, json.dumps(commands)],
@@ -154,9 +154,8 @@ def test_an_endless_scenario_ends_at_once(tmp_path, endless):
         check=False,
     )  # fmt: skip
     assert told.stdout == f"{[2] * len(commands)}\n"
-    said = told.stderr.splitlines()
-    assert len(said) == len(commands)
-    assert all(endless in line for line in said)
+    for (_, endless, *_), line in zip(commands, told.stderr.splitlines(), strict=True):
+        assert endless in line
     assert not (tmp_path / "sweep").exists()
 
 

@@ -195,7 +195,7 @@ def test_an_edit_after_the_import_keeps_and_finds_nothing(place, tmp_path, sourc
     copy = tmp_path / "copy"
     for name in ("slicemodel", "ode_reference", "engine_check", "flipproof"):
         package = Path(find_spec(name).origin).parent
-        shutil.copytree(package, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(package, copy / name, ignore=shutil.ignore_patterns("*.nb?"))
     code = EDITED.format(first=source)
     environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-c", code, str(place), str((copy / source.replace(".", "/")).with_suffix(".py"))]

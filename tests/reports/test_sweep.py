@@ -37,6 +37,8 @@ samples = {samples}
 fill_fraction = {{from = 0.1, to = 1.02}}
 damping_rate = {{from = 0.1, to = 100.0, scale = "log"}}
 bottle.length = {{from = 0.2, to = 0.3}}
+[scenario]
+n_slices = 8
 [[solvers]]
 name = "eq8"
 """

@@ -123,7 +123,7 @@ def _sources(names: Iterable[str]) -> Iterator[tuple[str, Path]]:
 
 def files_in(folder: Path) -> Iterator[Path]:
     """Yield the files of a folder, but for what Python and numba have compiled and for hidden ones."""
-    for entry in folder.rglob("*"):
-        parts = entry.relative_to(folder).parts
-        if entry.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
-            yield entry
+    for place, folders, names in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".") and name != "__pycache__"]
+        files = (Path(place, name) for name in names if not name.startswith("."))
+        yield from (file for file in files if file.is_file())
