@@ -520,13 +520,8 @@ def _of_motion(intervals: Sequence[Interval]) -> str:
         if best is not None and best[0] < 0.03:
             parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))
             return f"its slices accelerate by {parts} besides"
-    who = [
-        k
-        for k in range(flying[0].throw.n_slices)
-        if _rms([(i.v[1] - i.due["v"])[k] for i in flying if len(i.due["v"]) > k]) > 1e-3 * size
-    ]
-    return (
-        f"slice {who[0]} alone is off: look at what is done to it alone, as by a loop over slices"
-        if len(who) == 1 and flying[0].throw.n_slices > 1
-        else ""
-    )
+    n = flying[0].throw.n_slices
+    off = [_rms([(i.v[1] - i.due["v"])[k] for i in flying if i.throw.n_slices == n]) > 1e-3 * size for k in range(n)]
+    if n > 1 and sum(off) == 1:
+        return f"slice {off.index(True)} alone is off: look at what is done to it alone, as by a loop over slices"
+    return ""
