@@ -117,13 +117,17 @@ def _sources(names: Iterable[str]) -> Iterator[tuple[str, Path]]:
         assert spec.origin is not None
         origin = Path(spec.origin)
         package = spec.submodule_search_locations is not None
-        for file in sorted(files_in(origin.parent)) if package else [origin]:
-            yield f"{name}/{file.relative_to(origin.parent).as_posix()}", file
+        within = len(origin.parent.as_posix())
+        for file in sorted(files_in(origin.parent), key=os.fspath) if package else [origin]:
+            yield f"{name}{file.as_posix()[within:]}", file
 
 
 def files_in(folder: Path) -> Iterator[Path]:
     """Yield the files of a folder, but for what Python and numba have compiled and for hidden ones."""
-    for entry in folder.rglob("*"):
-        parts = entry.relative_to(folder).parts
-        if entry.is_file() and not any(part.startswith(".") or part == "__pycache__" for part in parts):
-            yield entry
+    for entry in os.scandir(folder):
+        if entry.name.startswith(".") or entry.name == "__pycache__":
+            continue
+        if entry.is_dir(follow_symlinks=False):
+            yield from files_in(Path(entry.path))
+        elif entry.is_file():
+            yield Path(entry.path)
