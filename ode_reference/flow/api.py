@@ -48,7 +48,7 @@ def fly(
     # Overflow is a result here, reported as a status: it must not also appear as a warning.
     with np.errstate(all="ignore"):
         flight, places, marks = layout.prepare(thrown, switches, settings, moved, speeds)
-        now = flight[0]
+        now = layout.numbers_of(flight)
         if scenario.frozen or 2 * (scenario.r_max - half) <= now.tolerance:
             hits = _hold(now, places[layout.PLACE], t_out, rows)
             y[:], v[:] = places[layout.PLACE], 0.0
@@ -56,7 +56,8 @@ def fly(
             from ode_reference.flow.loop import fly as loop
 
             hits = loop(flight, places, marks, t_out, rows, y, v)
-        reached, hits = int(now.recorded), hits[: int(now.impacts)]
+            now = layout.numbers_of(flight)
+        reached, hits = now.recorded, hits[: now.impacts]
         theta, inertia, y_cm = rows[:, :reached]
         omega = now.momentum / inertia
     r = np.clip(half + y[:reached], scenario.r_min, scenario.r_max)
@@ -64,12 +65,12 @@ def fly(
         r[0] = scenario.initial_positions() + moved  # to the last digit, as output at release
     # Impacts of one instant in the order of the slices.
     impacts = Impacts(*hits[np.lexsort((hits[:, 2], hits[:, 0]))].T[1:])
-    counters: dict[str, Any] = {name: int(now[name]) for name in ("steps", "impacts", "rests", "releases")}
-    counters |= {"evaluations": counters["steps"], "grazes": grazes(impacts, float(now.rest_speed))}
+    counters: dict[str, Any] = {name: getattr(now, name) for name in ("steps", "impacts", "rests", "releases")}
+    counters |= {"evaluations": counters["steps"], "grazes": grazes(impacts, now.rest_speed)}
     counters["opposite_hits"] = opposite_hits(impacts)
-    counters |= {name: float(now[name]) for name in ("largest_snap", "wronskian_error", "inertia_error")}
+    counters |= {name: getattr(now, name) for name in ("largest_snap", "wronskian_error", "inertia_error")}
     if now.ledger:
-        ledger = {name: float(now[f"work_{name}"]) for name in layout.WORKS}
+        ledger = {name: getattr(now, f"work_{name}") for name in layout.WORKS}
         initial, final = float(now.initial), float(now.final)
         residual = final - initial - sum(ledger.values())
         counters["energy"] = {"initial": initial, "final": final, **ledger, "residual": residual}
@@ -85,7 +86,7 @@ def fly(
         r_cm=half + y_cm,
         inertia=inertia,
         impacts=impacts,
-        status=STATUSES.get(int(now.status), "diverged"),
+        status=STATUSES.get(now.status, "diverged"),
         message=message(now, scenario, settings["model"], impacts),
         reason=messages.STIFF if now.status == STALLED and is_stiff(now, scenario, impacts) else "",
         settings=settings,
@@ -112,7 +113,7 @@ def message(now: Any, scenario: Scenario, model: str, impacts: Impacts) -> str:
     if now.status == OVERFLOW:
         return messages.overflow(model, scenario, now.t)
     if now.status == EXHAUSTED:
-        return messages.exhausted(model, int(now.impacts), now.t)
+        return messages.exhausted(model, now.impacts, now.t)
     if now.status == STALLED and is_stiff(now, scenario, impacts):
         return messages.stiff(model, scenario, now.t, fastest_rate(now))
     if now.status == STALLED:
@@ -122,13 +123,13 @@ def message(now: Any, scenario: Scenario, model: str, impacts: Impacts) -> str:
         WRONSKIAN: f"A B' - A' B differs from exp(-d t) by {now.wronskian_error:.1e} of it",
         INERTIA: f"J of the moments differs from J of the slices by {now.inertia_error:.1e} of it",
         ESCAPED: "a slice is outside the bottle",
-    }[int(now.status)]
+    }[now.status]
     return f"{model}: {broken} at t = {now.t:.9g} s; the run is given up, report it with its scenario"
 
 
 def fastest_rate(now: Any) -> float:
     """Return the fastest rate of the equations when the flight stopped [1/s]."""
-    return max(float(now.rate), float(now.damping))
+    return float(max(now.rate, now.damping))
 
 
 def is_stiff(now: Any, scenario: Scenario, impacts: Impacts) -> bool:

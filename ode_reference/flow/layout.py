@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
@@ -36,22 +37,24 @@ OK, OVERFLOW, STALLED, WRONSKIAN, INERTIA, ESCAPED, EXHAUSTED = range(7)
 WORKS: Final = ("drag", "weight", "negative_spring", "missing_origin", "impacts", "rests", "missing_recoil")
 """What changes the energy; the record keeps each as ``work_`` and its name."""
 
-_REAL = (
+_REAL: Final = (
     "slice_mass bottle_mass total_mass bottle_inertia momentum ratio gravity drag_rate kappa wall restitution "
     "rest_speed tolerance duration centre body_inertia reduced_mass spring damping weight push_z push_dz "
     "t theta A dA B dB y_mean dy_mean mu mw U P V "
     "base_time span pace clear fastest rate thrust omega rest_A rest_B rest_z h root y_cm shift "
     "largest_snap wronskian_error inertia_error watched_from initial final"
 )
-_WHOLE = (
+_WHOLE: Final = (
     "origin drag_on_centre recoil sequential mirrored ledger free on_base on_cap near order struck released hits "
     "steps impacts rests releases recorded status step_limit watch impact_limit"
 )
 
-RECORD: Final = np.dtype(
-    [(name, np.float64) for name in (*_REAL.split(), *(f"work_{name}" for name in WORKS))]
-    + [(name, np.int64) for name in _WHOLE.split()]
-)
+_TYPES: Final = {
+    **dict.fromkeys((*_REAL.split(), *(f"work_{name}" for name in WORKS)), np.float64),
+    **dict.fromkeys(_WHOLE.split(), np.int64),
+}
+
+RECORD: Final = np.dtype(list(_TYPES.items()))
 """One flight: throw, switches, body of tube and resting slices, state, search, ledger and counts; SI units.
 
 state     t; theta; the map A, B and its derivatives; mean place and speed of the free slices; mean and central moments
@@ -84,27 +87,40 @@ def prepare(
     ``moved`` is by how much the slices are off their places, shape (N,) [m]; ``speeds`` theirs [m/s].
     """
     throw, n = Throw.of(scenario), scenario.n_slices
-    flight = np.zeros(1, dtype=RECORD).view(np.recarray)
-    now = flight[0]
-    for name in ("slice_mass", "bottle_mass", "total_mass", "bottle_inertia"):
-        now[name] = getattr(throw, name)
-    now.momentum = throw.angular_momentum
-    now.ratio = switches.recoil * throw.slice_mass / throw.bottle_mass
-    now.gravity = 0.0 if switches.weightless else throw.gravity
-    now.drag_rate = throw.drag_rate if switches.signs else 0.0
-    now.kappa = 0.0 if switches.roots else (throw.drag_rate / 2) ** 2
-    now.wall = (scenario.r_max - scenario.r_min) / 2
-    now.restitution, now.rest_speed, now.duration = scenario.restitution, settings["rest_speed"], scenario.duration
-    now.tolerance = TOLERANCE * scenario.bottle.length
-    now.origin, now.drag_on_centre, now.recoil = switches.origin, switches.drag_on_centre, switches.recoil
-    now.sequential = settings["impact_law"] == "sequential" and switches.recoil
+    gravity = 0.0 if switches.weightless else throw.gravity
+    sequential = settings["impact_law"] == "sequential" and switches.recoil
     stacked = type(scenario).initial_positions is Scenario.initial_positions  # else let go elsewhere than Eq. 3a says
-    # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
     full = stacked and scenario.fill_fraction == 1.0 and not np.any(speeds)
-    now.mirrored = full and now.gravity == 0.0 and not now.sequential
-    now.ledger, now.step_limit, now.watch = settings["energy"], STEP_LIMIT, WATCH
-    now.impact_limit = messages.max_impacts(n)
-    now.theta, now.A, now.dB = scenario.theta0, 1.0, 1.0
+    given = {
+        "slice_mass": throw.slice_mass,
+        "bottle_mass": throw.bottle_mass,
+        "total_mass": throw.total_mass,
+        "bottle_inertia": throw.bottle_inertia,
+        "momentum": throw.angular_momentum,
+        "ratio": switches.recoil * throw.slice_mass / throw.bottle_mass,
+        "gravity": gravity,
+        "drag_rate": throw.drag_rate if switches.signs else 0.0,
+        "kappa": 0.0 if switches.roots else (throw.drag_rate / 2) ** 2,
+        "wall": (scenario.r_max - scenario.r_min) / 2,
+        "restitution": scenario.restitution,
+        "rest_speed": settings["rest_speed"],
+        "duration": scenario.duration,
+        "tolerance": TOLERANCE * scenario.bottle.length,
+        "origin": switches.origin,
+        "drag_on_centre": switches.drag_on_centre,
+        "recoil": switches.recoil,
+        "sequential": sequential,
+        # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
+        "mirrored": full and gravity == 0.0 and not sequential,
+        "ledger": settings["energy"],
+        "step_limit": STEP_LIMIT,
+        "watch": WATCH,
+        "impact_limit": messages.max_impacts(n),
+        "theta": scenario.theta0,
+        "A": 1.0,
+        "dB": 1.0,
+    }
+    flight = np.array([tuple(given.get(name, 0) for name in _TYPES)], dtype=RECORD).view(np.recarray)
     points, marks = np.zeros((6, n)), np.zeros((3, n), dtype=np.int64)
     # A full bottle is mirror symmetric to the last digit: its stack is as high as the tube is long.
     empty = (1.0 - scenario.fill_fraction) * scenario.bottle.length / 2
@@ -114,6 +130,11 @@ def prepare(
     points[PLACE] += moved
     points[SPEED] = speeds
     return flight, points, marks
+
+
+def numbers_of(flight: NDArray[Any]) -> SimpleNamespace:
+    """Return a copy of the numbers of a record, shape (1,), by their names: an attribute of the record takes longer."""
+    return SimpleNamespace(**dict(zip(_TYPES, flight[0].item(), strict=True)))
 
 
 def set_body(now: Any) -> None:

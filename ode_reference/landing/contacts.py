@@ -8,9 +8,8 @@ from slicemodel.compiled import merged
 
 
 @merged
-def gaps(s, q, world, out):
-    """Write all gaps: four corners over the table, then the slices' [m]."""
-    sine, cosine = math.sin(q[2]), math.cos(q[2])
+def gaps(s, q, sine, cosine, world, out):
+    """Write all gaps: four corners over the table, then the slices' [m]; ``sine`` and ``cosine`` are of theta."""
     for c in range(4):
         a = world.half if c < 2 else -world.half
         b = world.radius if c % 2 == 0 else -world.radius
@@ -25,9 +24,8 @@ def gaps(s, q, world, out):
 
 
 @merged
-def rates(w, q, world, out):
-    """Write the rates of all gaps [m/s]."""
-    sine, cosine = math.sin(q[2]), math.cos(q[2])
+def rates(w, q, sine, cosine, world, out):
+    """Write the rates of all gaps [m/s]; ``sine`` and ``cosine`` are of theta."""
     for c in range(4):
         a = world.half if c < 2 else -world.half
         b = world.radius if c % 2 == 0 else -world.radius

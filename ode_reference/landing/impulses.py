@@ -39,7 +39,6 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
     tube's velocity in the lab. ``free``: (v_t, omega) likewise. ``target``: least normal velocity of closed corners.
     ``sine``, ``cosine`` are of the axes; the corners are where they are at ``angle``.
     """
-    at_sine, at_cosine = math.sin(angle), math.cos(angle)
     m_all = world.tube + world.m * world.n
     a12, a22 = world.m * s1, world.own + world.m * s2
     det = m_all * a22 - a12 * a12
@@ -48,6 +47,7 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
         pn[c] = 0.0
         pt[c] = 0.0
         corners += closed[c]
+    at_sine, at_cosine = (math.sin(angle), math.cos(angle)) if corners > 0 else (0.0, 1.0)
     axial, across, torque = 0.0, 0.0, 0.0
     expected = 0.0
     for outer in range(MAX_POOLS):

@@ -239,7 +239,10 @@ def path(
     loop.land(q, s, w, dt, duration, False, world._replace(saddle=-math.inf, cap_saddle=-math.inf), every, record)
     record = record[np.isfinite(record[:, 0])]
     n = world.n
-    energy = [motion.energy(row[1:7], row[7 : 7 + n], row[7 + n :], world) for row in record]
+    energy = [
+        motion.energy(row[1:7], row[7 : 7 + n], row[7 + n :], math.sin(row[3]), math.cos(row[3]), world)
+        for row in record
+    ]
     return Path(
         t=record[:, 0],
         centre=record[:, 1:3],

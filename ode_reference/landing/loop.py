@@ -46,10 +46,12 @@ def land(q, s, w, dt, longest, fly, world, every, record):
     steps, impacts, unresolved, bounces = 0, 0, 0, 0
     aloft, still = False, 0
     origin = q[0] + world.half * math.sin(q[2])
-    rates(w, q, world, rate)
+    # Sines and cosines take a third of a landing: those of an instant, and of the end of a step, are computed once.
+    sine, cosine = math.sin(q[2]), math.cos(q[2])
+    rates(w, q, sine, cosine, world, rate)
     while t < longest:
         # This instant: whatever touches and approaches strikes.
-        gaps(s, q, world, gap)
+        gaps(s, q, sine, cosine, world, gap)
         strikes = False
         lowest = gap[0]
         for k in range(count):
@@ -64,15 +66,17 @@ def land(q, s, w, dt, longest, fly, world, every, record):
         elif aloft and lowest < LANDED:
             aloft = False
             bounces += 1
-        before = energy(q, s, w, world)
+        before = energy(q, s, w, sine, cosine, world)
         if strikes:
             impacts += 1
-            if not impact(q, s, w, touching, taking, closed, world, free, target, work, x, y, pn, pt, rate):
+            if not impact(
+                q, s, w, sine, cosine, touching, taking, closed, world, free, target, work, x, y, pn, pt, rate
+            ):
                 unresolved += 1
-            after = energy(q, s, w, world)
+            after = energy(q, s, w, sine, cosine, world)
             rise = max(rise, (after - before) / world.saddle)
             before = after
-            rates(w, q, world, rate)
+            rates(w, q, sine, cosine, world, rate)
             for k in range(count):
                 closed[k] = touching[k] and rate[k] <= STILL
         while rows < len(record) and t >= rows * every:
@@ -96,7 +100,8 @@ def land(q, s, w, dt, longest, fly, world, every, record):
             steps += 1
             if not step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1):
                 unresolved += 1
-            gaps(s1, q1, world, late)
+            sine1, cosine1 = math.sin(q1[2]), math.cos(q1[2])
+            gaps(s1, q1, sine1, cosine1, world, late)
             again, crossed, until = False, False, h
             for k in range(count):
                 if closed[k] or late[k] >= -tolerance or late[k] >= gap[k]:
@@ -116,8 +121,9 @@ def land(q, s, w, dt, longest, fly, world, every, record):
             for _ in range(MAX_TRIALS):
                 steps += 1
                 step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1)
-                gaps(s1, q1, world, late)
-                rates(w1, q1, world, ahead)
+                sine1, cosine1 = math.sin(q1[2]), math.cos(q1[2])
+                gaps(s1, q1, sine1, cosine1, world, late)
+                rates(w1, q1, sine1, cosine1, world, ahead)
                 early, least = high - h, np.inf
                 for k in range(count):
                     if not closed[k] and gap[k] > near:
@@ -140,7 +146,8 @@ def land(q, s, w, dt, longest, fly, world, every, record):
             q[k] = q1[k]
         for i in range(n):
             s[i], w[i] = s1[i], w1[i]
-        rates(w, q, world, rate)
+        sine, cosine = sine1, cosine1
+        rates(w, q, sine, cosine, world, rate)
         for k in range(count):
             if closed[k] and (pn[k] == 0.0 if k < 4 else rate[k] > STILL):
                 closed[k] = False

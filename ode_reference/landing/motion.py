@@ -79,9 +79,8 @@ def step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1
 
 
 @merged
-def energy(q, s, w, world):
-    """Return the energy over the table [J]."""
-    sine, cosine = math.sin(q[2]), math.cos(q[2])
+def energy(q, s, w, sine, cosine, world):
+    """Return the energy over the table [J]; ``sine`` and ``cosine`` are of theta."""
     v_r, v_t = q[3] * sine - q[4] * cosine, q[3] * cosine + q[4] * sine
     total = world.tube * ((q[3] * q[3] + q[4] * q[4]) / 2 + world.gravity * q[1]) + world.own * q[5] * q[5] / 2
     for i in range(world.n):
@@ -91,9 +90,8 @@ def energy(q, s, w, world):
 
 
 @merged
-def strike(q, s, w, taking, closed, world, free, target, work, x, y, pn, pt, rate):
+def strike(q, s, w, sine, cosine, taking, closed, world, free, target, work, x, y, pn, pt, rate):
     """Change the velocities by one impact of the contacts ``taking`` part; return whether impulses were found."""
-    sine, cosine = math.sin(q[2]), math.cos(q[2])
     v_r, v_t = q[3] * sine - q[4] * cosine, q[3] * cosine + q[4] * sine
     sum1, sum2 = 0.0, 0.0
     for i in range(world.n):
@@ -116,23 +114,23 @@ def strike(q, s, w, taking, closed, world, free, target, work, x, y, pn, pt, rat
 
 
 @merged
-def impact(q, s, w, touching, taking, closed, world, free, target, work, x, y, pn, pt, rate):
+def impact(q, s, w, sine, cosine, touching, taking, closed, world, free, target, work, x, y, pn, pt, rate):
     """Resolve one instant by the law of the world; return whether it could be."""
     count = len(touching)
-    rates(w, q, world, rate)
+    rates(w, q, sine, cosine, world, rate)
     if world.in_turn and min(rate[0], rate[1], rate[2], rate[3]) < 0.0:
         for k in range(count):
             taking[k] = touching[k] and k < 4
-        if not strike(q, s, w, taking, closed, world, free, target, work, x, y, pn, pt, rate):
+        if not strike(q, s, w, sine, cosine, taking, closed, world, free, target, work, x, y, pn, pt, rate):
             return False
     for _ in range(MAX_ROUNDS):
-        rates(w, q, world, rate)
+        rates(w, q, sine, cosine, world, rate)
         approach = 0.0
         for k in range(count):
             if touching[k]:
                 approach = min(approach, rate[k])
         if approach > -STILL:
             return True
-        if not strike(q, s, w, touching, closed, world, free, target, work, x, y, pn, pt, rate):
+        if not strike(q, s, w, sine, cosine, touching, closed, world, free, target, work, x, y, pn, pt, rate):
             return False
     return False

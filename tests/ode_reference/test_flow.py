@@ -304,8 +304,9 @@ def test_a_flight_ends_after_the_greatest_number_of_impacts(method, monkeypatch)
 )
 def test_a_broken_check_says_which(status, words):
     flight, *_ = layout.prepare(HALF, MODELS["eq8"].switches, {"rest_speed": 1e-5, "impact_law": "", "energy": False})
-    flight[0].status = status
-    result = api.message(flight[0], HALF, "eq8", solve(HALF).impacts)
+    now = layout.numbers_of(flight)
+    now.status = status
+    result = api.message(now, HALF, "eq8", solve(HALF).impacts)
     assert words in result
     assert "eq8" in result
 

@@ -117,8 +117,9 @@ def _sources(names: Iterable[str]) -> Iterator[tuple[str, Path]]:
         assert spec.origin is not None
         origin = Path(spec.origin)
         package = spec.submodule_search_locations is not None
-        for file in sorted(files_in(origin.parent)) if package else [origin]:
-            yield f"{name}/{file.relative_to(origin.parent).as_posix()}", file
+        within = len(origin.parent.as_posix())
+        for file in sorted(files_in(origin.parent), key=os.fspath) if package else [origin]:
+            yield f"{name}{file.as_posix()[within:]}", file
 
 
 def files_in(folder: Path) -> Iterator[Path]:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from typing import Any, Final
@@ -21,27 +22,32 @@ OWN: Final = ("slicemodel", "ode_reference", "engine_check", "flipproof")
 """Packages whose data classes can be packed."""
 
 TREE: Final = "value.json"
-"""Member of the archive that holds the value; an array is named there by its place among the arrays."""
+"""Member of the archive that holds the value; an array is named there by its member and its place in that."""
 
-Arrays = list[NDArray[Any]]
+Arrays = dict[tuple[np.dtype[Any], tuple[int, ...]], list[NDArray[Any]]]
+"""Type and shape -> the arrays that have them: a member of the archive, since each costs as much as a large array."""
 
 
-def pack(value: object) -> bytes:
+def pack(value: object, largest: float = math.inf) -> bytes:
     """Return a value as the bytes of an NPZ archive; ``unpack`` gives an equal one, floats to the last bit.
 
     Raises
     ------
     TypeError
         If a part of it is no number, text, bytes, container, array, data class or named tuple of this program.
+    ValueError
+        If its arrays have more than ``largest`` bytes before they are compressed.
     """
-    arrays: Arrays = []
+    arrays: Arrays = {}
     tree = json.dumps(_plain(value, arrays))
+    if (size := sum(array.nbytes for alike in arrays.values() for array in alike)) > largest:
+        raise ValueError(f"{size} bytes of arrays are more than {largest:.0f}")
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr(TREE, tree)
-        for number, array in enumerate(arrays):
+        for number, alike in enumerate(arrays.values()):
             member = io.BytesIO()
-            np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
+            np.lib.format.write_array(member, np.stack(alike), allow_pickle=False)
             archive.writestr(f"{number}.npy", member.getvalue())
     return file.getvalue()
 
@@ -55,7 +61,8 @@ def unpack(content: bytes) -> Any:
         Of any kind, if the bytes are not those of ``pack``; a data class may refuse its values.
     """
     with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-        return _value(json.loads(archive[TREE]), archive)
+        stacks = [archive[f"{number}.npy"] for number in range(len(archive.files) - 1)]
+        return _value(json.loads(archive[TREE]), stacks)
 
 
 def _plain(value: Any, arrays: Arrays) -> Any:
@@ -67,8 +74,9 @@ def _plain(value: Any, arrays: Arrays) -> Any:
         array = np.frombuffer(value, dtype=np.uint8) if isinstance(value, bytes) else np.asarray(value)
         if array.dtype.hasobject:
             raise TypeError("an array of objects cannot be packed")
-        arrays.append(array)
-        return [kind, len(arrays) - 1]
+        alike = arrays.setdefault((array.dtype, array.shape), [])
+        alike.append(array)
+        return [kind, list(arrays).index((array.dtype, array.shape)), len(alike) - 1]
     if type(value) in (list, tuple):
         return [type(value).__name__, [_plain(element, arrays) for element in value]]
     if isinstance(value, Mapping):
@@ -82,20 +90,20 @@ def _plain(value: Any, arrays: Arrays) -> Any:
     raise TypeError(f"{cls.__module__}.{cls.__qualname__} cannot be packed")
 
 
-def _value(tree: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+def _value(tree: Any, stacks: Sequence[NDArray[Any]]) -> Any:
     """Return what ``_plain`` made a tree of."""
     if not isinstance(tree, list):
         return tree
     kind, content, *rest = tree
     if kind in ("list", "tuple"):
-        values = [_value(element, arrays) for element in content]
+        values = [_value(element, stacks) for element in content]
         return tuple(values) if kind == "tuple" else values
     if kind == "dict":
-        return {_value(key, arrays): _value(element, arrays) for key, element in content}
+        return {_value(key, stacks): _value(element, stacks) for key, element in content}
     if kind == "data":
-        return _class_of(content)(**{name: _value(element, arrays) for name, element in rest[0]})
-    array = arrays[f"{content}.npy"]
-    return array.tobytes() if kind == "bytes" else array[()] if kind == "scalar" else array
+        return _class_of(content)(**{name: _value(element, stacks) for name, element in rest[0]})
+    part = stacks[content][rest[0]]
+    return part.tobytes() if kind == "bytes" else part if kind == "scalar" else np.asarray(part)
 
 
 def _class_of(name: str) -> type[Any]:

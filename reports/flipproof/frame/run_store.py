@@ -15,6 +15,7 @@ used, runs are made as if there were none.
 from __future__ import annotations
 
 import json
+import math
 import os
 import sqlite3
 import stat
@@ -43,6 +44,10 @@ WORDS: Final = "from the store"
 BYTES_A_SECOND: Final = 4e6
 """Bytes that an entry may have for each second that it took to make: what is larger is made again instead."""
 
+COMPRESSED: Final = 5.0
+"""Times that an entry becomes smaller at best. What would be too large even then is not compressed to see: flights
+with all their slices take longer to compress than to make."""
+
 
 class RunStore(AbstractContextManager["RunStore"]):
     """Runs by what decides them. Use as a context manager; ``RunStore(None)`` keeps nothing and finds nothing.
@@ -69,6 +74,7 @@ class RunStore(AbstractContextManager["RunStore"]):
         self.found_calls: list[str] = []
         self._lock = threading.RLock()
         self._store: Store | None = None
+        self._added = 0
         self._writable = True
         self._problem = "" if place else "not asked for"
         if place is None:
@@ -86,6 +92,8 @@ class RunStore(AbstractContextManager["RunStore"]):
     def close(self) -> None:
         """Close the file."""
         with self._lock:
+            if self._added:
+                self._evict()
             if self._store is not None:
                 self._store.close()
             self._store = None
@@ -157,6 +165,12 @@ class RunStore(AbstractContextManager["RunStore"]):
             return
         entry = Entry(key, {**shared, "versions": versions_of()}, json.dumps(question), content)
         self._change(lambda store: store.put([entry], dated=True))
+        self._added += len(content)
+        if self._added > self.limit / 20:  # to look for what was used longest ago takes longer than to write
+            self._evict()
+
+    def _evict(self) -> None:
+        self._added = 0
         self._change(lambda store: store.evict(self.limit))
 
     def _same_program(self) -> bool:
@@ -222,11 +236,12 @@ def packed(value: object, seconds: float, slow: float) -> bytes | None:
     """
     if seconds < slow:
         return None
+    allowed = BYTES_A_SECOND * seconds if slow > 0.0 else math.inf
     try:
-        content = pack((value, f"{datetime.now(UTC):%Y-%m-%d %H:%M}"))
+        content = pack((value, f"{datetime.now(UTC):%Y-%m-%d %H:%M}"), COMPRESSED * allowed)
     except (TypeError, ValueError, RecursionError):
         return None
-    return content if slow == 0.0 or len(content) <= BYTES_A_SECOND * seconds else None
+    return content if len(content) <= allowed else None
 
 
 class _Remembering(Executor):
