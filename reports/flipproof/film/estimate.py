@@ -233,8 +233,7 @@ def _estimated(
 
 def near_flight(film: Film, likelihood: Likelihood, release: float) -> Likelihood:
     """Return the likelihood of a film's frames in flight and of those before and after it, which say when it is."""
-    margin = REACH
-    near = (film.t >= release - margin) & (film.t <= likelihood.touch + margin)
+    near = (film.t >= release - REACH) & (film.t <= likelihood.touch + REACH)
     part = replace(film, t=film.t[near], values=film.values[:, near], lines=film.lines[near])
     return likelihood.but(film=part)
 

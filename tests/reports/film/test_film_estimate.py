@@ -197,12 +197,12 @@ def test_ice_tells_nothing_of_drag():
     ("spoil", "words"),
     [
         (lambda made: replace_clip(made, made.t * 1.2), "frame rate"),
-        (lambda made: cut(made, made.truth["release"] + 0.02), "within two frames of the first"),
+        (lambda made: cut(made, made.truth["release"] + 0.01), "within two frames of the first"),
     ],
     ids=["clock", "begins in flight"],
 )
 def test_what_cannot_be_right_is_refused_with_what_to_click(tmp_path, capsys, spoil, words):
-    path = written(tmp_path / "film.txt", spoil(clip(7, fps=30)))
+    path = written(tmp_path / "film.txt", spoil(clip(7, fps=60)))
     throw = tmp_path / "throw.toml"
     throw.write_text(THROW.to_toml(), encoding="utf-8")
     asked = ["--cap", "cap", "--base", "base", "--length-unit", "m", "--scenario", str(throw)]
