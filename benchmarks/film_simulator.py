@@ -27,11 +27,11 @@ def film(
     rng: np.random.Generator, *, fps: float = 240.0, noise: float = 1e-3, tilt: float = 0.0, filling: float = 0.5,
     bad: int = 0, missing: int = 0, gamma: float = 6.0, e: float = 0.4, omega0: float = 18.0, slices: int = 20,
     duration: float = 0.5, model: str = "free-flight", theta0: float | None = None, hand: float = 0.3,
-    swings: bool = False,
+    swings: bool = False, flick: float = 0.0,
 ) -> Clip:  # fmt: skip
     """Return a clip; ``tilt`` in degrees, ``bad`` clicks and ``missing`` points fall on frames in flight.
 
-    The hand accelerates steadily, or as ``swung`` says.
+    The hand accelerates steadily, or as ``swung`` says, or holds still and flicks the bottle away in ``flick`` seconds.
     """
     theta0 = float(rng.uniform(1.2, 1.9)) if theta0 is None else theta0
     scene = Scenario(water_mass=filling, omega0=omega0, theta0=theta0, restitution=e, duration=duration)
@@ -45,7 +45,12 @@ def film(
     length, g = scene.bottle.length, 9.81
     velocity = np.array([rng.uniform(-0.8, 0.8), rng.uniform(2.0, 2.8)])
     # In the hand: other accelerations, which end at the release; place, velocity and turning meet the flight.
-    if swings:
+    if flick:
+        # Velocity and turning rise by s^2 (3 - 2 s): fastest halfway, and no more at the release.
+        part = np.clip(1 + tau / flick, 0, 1)
+        lag = flick * (0.5 - part + part**3 - part**4 / 2) + np.maximum(-tau - flick, 0)
+        pull, twist = np.outer(lag, velocity), omega0 * lag
+    elif swings:
         pull, twist = swung(rng, tau)
     else:
         steady, bend = rng.uniform(-1, 1, 2) * (15, 5) + (0, 15), rng.uniform(-80, 80)

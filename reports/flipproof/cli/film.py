@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +19,6 @@ from flipproof.cli.arguments import (
     read_scenario,
 )
 from flipproof.cli.progress import progress_bar
-
-DELIMITERS = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
 
 def add_film(commands: Any) -> None:
@@ -45,8 +41,6 @@ def add_film(commands: Any) -> None:
     export.add_argument("--format", choices=("tracker",), default="tracker", help="data track (%(default)s)")
     export.add_argument("--out", type=output, metavar="FILE", help="file to write (default: standard output)")
     export.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
-    export.add_argument("--speed", type=number, metavar="V", help="speed of C_M at release [m/s] (default: scenario's)")
-    export.add_argument("--launch-angle", type=number, metavar="DEG", help="launch angle above the horizontal")
     export.add_argument("--height", type=number, metavar="M", help="table above the cap at release [m]: stop there")
     export.add_argument("--frame-rate", type=number, default=240.0, metavar="HZ", help="of the video (%(default)g)")
     export.add_argument("--start", type=number, default=0.0, metavar="S", help="time of release in the video (0)")
@@ -54,8 +48,6 @@ def add_film(commands: Any) -> None:
         "--origin", type=_pair, default=(0.0, 0.0), metavar="X,Y", help="cap at release [m] (0,0); below 0 as "
         "--origin=-0.1,0.2",
     )  # fmt: skip
-    export.add_argument("--length-unit", default="m", metavar="UNIT", help="of the video: m, cm, mm (%(default)s)")
-    export.add_argument("--delimiter", choices=tuple(DELIMITERS), default="tab", help="between cells (%(default)s)")
 
     fit = add_command(commands, "fit", "Fit equations to a measured flight and compare them.", command_film)
     fit.add_argument(
@@ -90,7 +82,6 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--slices", type=count, metavar="N", help="slices of every throw, gamma unchanged (50)")
     command.add_argument("--release", type=number, metavar="S", help="known time of release by the film's clock [s]")
     command.add_argument("--landing", type=number, metavar="S", help="known time of the touch by the film's clock [s]")
-    command.add_argument("--table-height", type=number, metavar="M", help="known y of the table in the picture [m]")
     command.add_argument("--noise", type=_positive, metavar="S", help="known noise of one coordinate [m, rad, rad/s]")
     command.add_argument(
         "--hold", nargs="+", default=[], choices=("tilt", "scale"), help="known: the camera is level; the picture's "
@@ -161,8 +152,8 @@ def _estimate(options: argparse.Namespace, paths: tuple[Path, ...], scenario: An
     if options.release is not None and options.landing is not None and not options.release < options.landing:
         raise ValueError(f"landing = {options.landing:g} s does not follow release = {options.release:g} s")
     held = Held(
-        release=options.release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
-        scale="scale" in options.hold, noise=options.noise,
+        release=options.release, touch=options.landing, tilt="tilt" in options.hold, scale="scale" in options.hold,
+        noise=options.noise,
     )  # fmt: skip
     with progress_bar(solver, "flight") as step:
         seconds = 60.0 * options.minutes
@@ -195,15 +186,11 @@ def _shared(draws: Mapping[str, Any], words: str) -> list[str]:
 def command_export(options: argparse.Namespace) -> int:
     """Run one solver and write cap, base and centre of mass in the lab, one row per frame."""
     from flipproof.film.tracker.export import at_times, data_track_text, frame_times, until_landing
-    from flipproof.film.tracker.table import METRES
     from flipproof.frame.solvers import find, solve
     from flipproof.output.folder import write_text
 
-    if options.length_unit not in METRES:
-        raise ValueError(f"length_unit = {options.length_unit!r} is unknown; known: {', '.join(METRES)}")
     check_outputs(options, "out")
     scenario = read_scenario(options.scenario, options.slices)
-    scenario = replace(scenario, launch_velocity=_velocity(scenario.launch_velocity, options))
     times = frame_times(scenario, options.frame_rate)
     run = solve(find(options.solver).name, scenario)
     if not run.ok:
@@ -212,25 +199,12 @@ def command_export(options: argparse.Namespace) -> int:
     if options.height is not None:
         frames, words = until_landing(run, frames, options.height)
         print(f"flipproof: {words}", file=sys.stderr)
-    table = data_track_text(
-        frames, start=options.start, origin=options.origin, metres=METRES[options.length_unit],
-        delimiter=DELIMITERS[options.delimiter],
-    )  # fmt: skip
+    table = data_track_text(frames, start=options.start, origin=options.origin)
     if options.out:
         write_text(options.out, table)
     else:
         sys.stdout.write(table)
     return 0
-
-
-def _velocity(given: tuple[float, float], options: argparse.Namespace) -> tuple[float, float]:
-    if options.speed is None and options.launch_angle is None:
-        return given
-    if options.speed is not None and options.speed < 0:
-        raise ValueError(f"speed = {options.speed:g} m/s is outside [0, inf)")
-    speed = math.hypot(*given) if options.speed is None else options.speed
-    angle = math.atan2(given[1], given[0]) if options.launch_angle is None else math.radians(options.launch_angle)
-    return speed * math.cos(angle), speed * math.sin(angle)
 
 
 def _pair(text: str) -> tuple[float, float]:

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from flipproof.film.curves import SLICES, STEP, Curve, Equation
+from flipproof.film.hand import MOTIONS, REACH
 from flipproof.film.kernel.scoring import turnings
-from flipproof.film.likelihood import GRAVITY, HAND, POWERS, TOUCH, Film, Fit, Held, Likelihood
+from flipproof.film.likelihood import GRAVITY, HAND, TOUCH, Film, Fit, Held, Likelihood
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -43,6 +44,9 @@ FEW: Final = 4
 FASTER: Final = np.geomspace(0.8, 2.5, 12)
 """omega_0 in units of the angular velocity in the first frames, which the water slows down within them."""
 
+SHORTER: Final = (0.4, 0.55, 0.7, 0.85, 1.0)
+"""Shares of a turning that fits, at whose ends the touch may be."""
+
 NEGLIGIBLE: Final = 9.0
 """Logarithm of how much less likely than the best a pair must be to be left out."""
 
@@ -54,6 +58,12 @@ ENOUGH: Final = 40
 
 DEEPEST: Final = 4
 """Times that a cell is cut at the most."""
+
+HOPELESS: Final = 250.0
+"""Logarithm of how much less likely than the best a first guess is left out, beyond what ``_implausible`` may cost."""
+
+EARTHLY: Final = 0.15
+"""Relative error of gravity up to which a film is believed at once: its stick may be off."""
 
 DRAWS: Final = 8000
 """Sets of parameters drawn from the posterior."""
@@ -82,6 +92,7 @@ class Estimate:
     touched : bool - whether the record goes on after the flight
     flights : int - of the solver
     complete : bool - whether the time sufficed for the grid to close in
+    guess : float - cost of the likeliest first guess
     """
 
     film: Film
@@ -96,6 +107,7 @@ class Estimate:
     touched: bool
     flights: int
     complete: bool
+    guess: float = 0.0
 
     @property
     def best(self) -> dict[str, float]:
@@ -158,6 +170,33 @@ def estimate(
     """
     held = held or Held()
     sliced = throw.with_slices(slices or min(throw.n_slices, SLICES))
+    starts = _start(thinned(film), sliced, held)
+
+    first = replace(_estimated(film, sliced, solver, held, starts, seconds, tick), guess=starts[0][0])
+    earthly = [guess for guess in starts if guess[1].two and _earthly(guess[2])]
+    if not first.likelihood.two or _earthly(first.fit.x) or not earthly:
+        return first
+    # A film whose gravity cannot be right is read anew from what falls as things do, if anything does.
+    second = _estimated(film, sliced, solver, held, earthly, seconds, tick)
+    sound = _earthly(second.fit.x) and second.best["noise"] < 2.0 * film.scatter()
+    return replace(second, guess=earthly[0][0]) if sound else first
+
+
+def _earthly(x: FloatArray) -> bool:
+    """Return whether a film's gravity is about the earth's."""
+    return abs(math.hypot(x[7], x[8]) / GRAVITY - 1.0) < EARTHLY
+
+
+def _estimated(
+    film: Film,
+    sliced: Scenario,
+    solver: str,
+    held: Held,
+    starts: list[tuple[float, Likelihood, FloatArray]],
+    seconds: float,
+    tick: Callable[[int], object],
+) -> Estimate:
+    """Return the estimate from first guesses."""
     made, began = 0, time.perf_counter()
 
     def count(flights: int) -> None:
@@ -165,13 +204,12 @@ def estimate(
         made += flights
         tick(flights)
 
-    starts = [(likelihood, x) for _, likelihood, x in _start(film, sliced, held)]
-    reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, x in starts) + 0.5  # the touch may turn out later
+    reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, _, x in starts) + 0.5  # the touch may turn out later
     equation = Equation(solver, sliced, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
-    likelihood, x = starts[0] if len(starts) == 1 else _chosen(starts, equation)
+    likelihood, x = starts[0][1:] if len(starts) == 1 else _chosen(starts, equation)
     if likelihood.two:
-        likelihood = likelihood.but(orders=POWERS)
-        x = np.insert(x, -2, np.zeros(3 * (POWERS - 1)))
+        likelihood = likelihood.but(film=film, count=MOTIONS)
+        x = np.insert(x, -2, np.zeros(3 * (MOTIONS - 1)))
     likelihood, grid, complete = _closed_in(likelihood, equation, x, seconds)
     if not np.isfinite(grid.masses).any():
         raise NoFlightError(f"{film.label}: {solver}: no flight fits the clicks; check that y points up")
@@ -195,8 +233,7 @@ def estimate(
 
 def near_flight(film: Film, likelihood: Likelihood, release: float) -> Likelihood:
     """Return the likelihood of a film's frames in flight and of those before and after it, which say when it is."""
-    margin = 0.15
-    near = (film.t >= release - margin) & (film.t <= likelihood.touch + margin)
+    near = (film.t >= release - REACH) & (film.t <= likelihood.touch + REACH)
     part = replace(film, t=film.t[near], values=film.values[:, near], lines=film.lines[near])
     return likelihood.but(film=part)
 
@@ -347,13 +384,15 @@ def _grown(
     return low, high
 
 
-def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> tuple[Likelihood, FloatArray]:
+def _chosen(starts: list[tuple[float, Likelihood, FloatArray]], equation: Equation) -> tuple[Likelihood, FloatArray]:
     """Return the start that a coarse grid explains best, and where that ends."""
     axes = [(np.arange(n) + 0.5) / n for n in COARSE]
     rates = np.array([(SCALE * np.sinh(a * np.arcsinh(MAX_RATE / SCALE)), e) for a, e in product(*axes)])
     best: tuple[float, Likelihood, FloatArray] | None = None
     flown: list[Curve | None] = []
-    for start, x in starts:
+    for cost, start, x in starts:
+        if cost > starts[0][0] + HOPELESS:
+            break
         if not flown or equation.weighted:
             flown = equation.curves(rates, float(x[2]), float(x[1]))
         pairs = [(curve, start.fitted(curve, x, 15)) for curve in flown if curve is not None]
@@ -365,7 +404,7 @@ def _chosen(starts: list[tuple[Likelihood, FloatArray]], equation: Equation) -> 
             cost = again.cost + (_implausible(start.film, again.x) if start.two else 0.0)
             if best is None or cost < best[0]:
                 best = cost, likelihood, again.x
-    return starts[0] if best is None else best[1:]
+    return starts[0][1:] if best is None else best[1:]
 
 
 def _descent(
@@ -438,9 +477,6 @@ def _touches(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[Float
     step = float(np.median(np.diff(film.t)))
     if likelihood.held.touch is not None or not likelihood.two or not (film.t > x[0]).any():
         return np.array([likelihood.touch, likelihood.touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
-    if likelihood.held.table is not None:
-        touch = _at_table(likelihood, curve, x, likelihood.held.table)
-        return np.array([touch, touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
     frames = np.append(film.t[film.t > x[0]], film.t[-1] + step)
     rough = {speed: likelihood.touches(curve, x, frames, speed) for speed in TOUCH}
     speed = min(rough, key=lambda velocity: float(rough[velocity].min()))
@@ -449,22 +485,6 @@ def _touches(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[Float
     # How fast the table takes the velocity, and since when, look alike.
     costs = [likelihood.touches(curve, x, times, velocity) for velocity in TOUCH]
     return times, -np.asarray(np.logaddexp.reduce(-np.array(costs), axis=0)), speed
-
-
-def _at_table(likelihood: Likelihood, curve: Curve, x: FloatArray, height: float) -> float:
-    """Return when the fitted bottle, falling, comes down to the table with an end."""
-    film = likelihood.film
-    times = np.linspace(float(x[0]), float(film.t[-1]), 2000)
-    dense = replace(film, t=times, values=np.zeros((2, len(times), 2)), lines=np.zeros(len(times), dtype=np.int64))
-    values, _ = Likelihood(dense, Held(), np.inf, 1.0).model(curve, x)
-    lowest = values[:, :, 1].min(axis=0)
-    below = np.flatnonzero((lowest[1:] <= height) & (lowest[:-1] > height))
-    if not len(below):
-        raise ValueError(
-            f"{film.label}: table_height = {height:g} m: the bottle never comes down to it; its lowest end is in "
-            f"[{lowest.min():.4g}, {lowest.max():.4g}] m"
-        )
-    return float(times[below[-1] + 1])
 
 
 def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
@@ -482,20 +502,24 @@ def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
 def exchange_gain(one: Estimate, doubted: float) -> float:
     """Return by how much the clicks become likelier (logarithm) if cap and base are exchanged; -inf without a flight.
 
-    First guesses are compared, of some 80 frames of the film, evenly chosen; where these gain more than ``doubted``,
+    First guesses are compared; where these gain more than ``doubted``,
     as they did in 1 of 30 right films, both labels are estimated and compared.
     """
     film = one.film
-    some = slice(None, None, max(1, len(film.t) // 80))
-    part = replace(film, t=film.t[some], values=film.values[:, some], lines=film.lines[some])
     try:
-        costs = [_start(each, one.throw, one.held)[0][0] for each in (part, exchanged(part))]
+        costs = [one.guess, _start(exchanged(thinned(film)), one.throw, one.held)[0][0]]
         if costs[0] - costs[1] > doubted:
             other = estimate(exchanged(film), one.throw, one.solver, one.held)
             costs = [each.likelihood.pieces(each.curve, each.fit.x)[0].sum() for each in (one, other)]
     except NoFlightError:
         return -math.inf
     return float(costs[0] - costs[1])
+
+
+def thinned(film: Film) -> Film:
+    """Return a film of some hundred of the frames, evenly chosen, for first guesses."""
+    some = slice(None, None, max(1, len(film.t) // 80)) if film.quantity == "points" else slice(None)
+    return replace(film, t=film.t[some], values=film.values[:, some], lines=film.lines[some])
 
 
 def exchanged(film: Film) -> Film:
@@ -530,20 +554,20 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
         if score < 0.4 * matches[:, 0].max() or not score:
             continue
         curve, end = every[int(index)], float(times[int(last)])
-        x, noise = _placed(film, curve, np.array([times[k], start, omega0]), end, length)
-        noise = max(noise, 1e-5)
-        # The turning may go on like that on the table, which bends the parabola: fits begin with gravity near the
-        # earth's, too, and with an earlier touch.
-        ends = [end, times[k] + 0.7 * (end - times[k])] if held.touch is None else [held.touch]
-        begins = [(ends[0], TOUCH[1], x)]
+        spin = np.array([times[k], start, omega0])
+        # The turning may go on like that on the table, which bends the parabola: fits begin with earlier touches, too.
+        ends = [times[k] + part * (end - times[k]) for part in SHORTER] if held.touch is None else [held.touch]
+        begins = []
         for touch in ends:
-            earthly = Likelihood(film, held, touch, noise)
+            x, noise = _placed(film, curve, spin, touch, length)
+            begin = Likelihood(film, held, touch, max(noise, 1e-5))
+            begins.append((begin.terms(curve, x)[0] + _implausible(film, x), begin, x))
+        begins.sort(key=lambda guess: guess[0])
+        for _, begin, x in begins[:3]:
+            earthly = begin.but()
             earthly.expected[8], earthly.stiffness[8] = -GRAVITY, 0.5**-2
-            fit = earthly.fitted(curve, x, 8)
-            settled = settle(earthly, curve, fit.x)
-            begins.append((settled.touch, settled.speed, fit.x))
-        for touch, speed, begin in begins:
-            better = _better(Likelihood(film, held, touch, noise, speed), curve, begin)
+            x = earthly.fitted(curve, x, 8).x
+            better = _better(settle(begin, curve, x), curve, x)
             if better[2][8] < 0.0:  # what accelerates upwards is no flight
                 tried.append(better)
     # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.

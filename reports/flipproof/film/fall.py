@@ -32,13 +32,12 @@ FAR: Final = 0.2
 class Share(NamedTuple):
     """What the frames before a release show of a hand.
 
-    ``seconds`` is how far they reach, ``share`` what they show of carrying, ``error`` its standard error, ``misfit``
-    the mean square of what a free fall leaves, in its variances.
+    ``seconds`` is how far they reach, ``share`` what they show of carrying, ``misfit`` the mean square of what a free
+    fall leaves, in its variances.
     """
 
     seconds: float
     share: float
-    error: float
     misfit: float
 
     @property
@@ -97,5 +96,5 @@ def _share(
         fisher = float(pattern[kept] @ weighed[:, 0])
         if fisher > 1.0 / ERROR**2:
             share, misfit = float(pattern[kept] @ weighed[:, 1]) / fisher, float(left[kept] @ weighed[:, 1]) / len(kept)
-            return Share(float(away[count - 1]), share, fisher**-0.5, misfit)
+            return Share(float(away[count - 1]), share, misfit)
     return None

@@ -4,11 +4,11 @@
     base(t) = cap(t) + l u                             R = r_CM / L and theta by the equation (``curves``)
 
 Every click of two coordinates misses by a normal deviate of variance v, but for a share of bad clicks, which may lie
-anywhere in the picture. In flight v = sigma^2. Before the release a hand adds K powers of tau, from the second on, to
-C_M and to theta, which are fitted, since what a hand does in one frame it does in the next; the power after these has
-the size A, and after the touch the table takes the velocity:
+anywhere in the picture. In flight v = sigma^2. Before the release a hand adds motions to C_M and to theta (``hand``),
+which are fitted, since what a hand does in one frame it does in the next; what they do not describe has the size A,
+and after the touch the table takes the velocity:
 
-    v = sigma^2 + (A tau^(K+2)/((K+2)! QUICK^K))^2  before,    v = sigma^2 + (V (t - t_d))^2  after,
+    v = sigma^2 + (A tau^K/(K! QUICK^(K-2)))^2  before,    v = sigma^2 + (V (t - t_d))^2  after,
 
 never beyond the picture.
 
@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.film.curves import Curve
+from flipproof.film.hand import APART, FREEDOM, JUMP, LIFT, PULL, motions
 from flipproof.film.kernel.scoring import ended, points, sums, variances
 from slicemodel.trajectory import FloatArray
 
@@ -34,18 +35,12 @@ GRAVITY: Final = 9.81
 BAD: Final = 0.01
 """Share of clicks that may lie anywhere."""
 
-PULL: Final = (60.0, 60.0, 300.0)
-"""Standard deviations of a hand's accelerations less those of flight: of C_M [m/s^2], twice, and of theta [rad/s^2];
-and of their derivatives times powers of ``QUICK``."""
+FEWEST: Final = 3
+MOST: Final = 6
+"""Powers of time by which a hand is unknown, beyond a steady acceleration and beyond its motions."""
 
 HAND: Final = (25.0, 0.5)
-"""Size of the first derivative that is not fitted, scaled alike, and the standard deviation of its logarithm."""
-
-POWERS: Final = 4
-"""Powers of time that a hand adds in the last fits: of its acceleration and of the first three derivatives of that.
-
-First guesses have the acceleration alone: a hand that may do anything could fly the bottle.
-"""
+"""Size of what a hand does beyond its motions (``kernel.scoring.variances``), and the deviation of its logarithm."""
 
 TIGHT: Final = 1e-6
 """Standard deviation of what is held."""
@@ -80,11 +75,11 @@ class Film:
     lines: NDArray[np.int64]
     notes: tuple[str, ...] = ()
 
-    def names(self, orders: int) -> tuple[str, ...]:
-        """Return the names of the inner parameters, with ``orders`` powers of time that a hand adds."""
+    def names(self, count: int) -> tuple[str, ...]:
+        """Return the names of the inner parameters, with so many motions of a hand."""
         if self.quantity != "points":
             return SPIN
-        hand = (f"hand_{order + 2}_{name}" for order in range(orders) for name in ("x", "y", "theta"))
+        hand = (f"hand_{k}_{name}" for k in range(count) for name in ("x", "y", "theta"))
         return (*PLACED, *hand, "log_noise", "log_hand")
 
     @property
@@ -120,7 +115,6 @@ class Held:
     Parameters
     ----------
     release, touch : float or None - [s] by the film's clock
-    table : float or None - y of the table in the picture [m]: the touch is when an end comes down to it
     tilt : bool - the picture's vertical is true
     scale : bool - gravity in the picture is 9.81 m/s^2
     noise : float or None - standard deviation of one coordinate
@@ -128,7 +122,6 @@ class Held:
 
     release: float | None = None
     touch: float | None = None
-    table: float | None = None
     tilt: bool = False
     scale: bool = False
     noise: float | None = None
@@ -156,23 +149,24 @@ class Likelihood:
     """Minus the logarithm of the density of a film's values and of the weak priors, as a function of ``names``."""
 
     def __init__(
-        self, film: Film, held: Held, touch: float, noise: float, speed: float = TOUCH[1], orders: int = 1
+        self, film: Film, held: Held, touch: float, noise: float, speed: float = TOUCH[1], count: int = 1
     ) -> None:
-        """Take the touch, a first guess of the noise, the velocity that the table takes, and the hand's powers."""
+        """Take the touch, a guess of the noise, the velocity that the table takes, and the hand's number of motions."""
         self.film, self.held, self.touch, self.noise, self.speed = film, held, touch, noise, speed
         self.area, self.seen = film.area, film.clicked
         self.two = film.values.shape[2] == 2
-        self.orders, self.names = orders, film.names(orders)
+        self.count, self.names, self.hands = count, film.names(count), motions(count)
+        self.power = FEWEST if count == 1 else MOST
         self.index = {name: k for k, name in enumerate(self.names)}
         self.log_bad = float(np.log(BAD / self.area))
         self.expected, self.stiffness = self._priors()
-        # Ten that place the flight and three accelerations of a hand; its other powers follow their priors.
+        # Ten that place the flight and three accelerations of a hand; its other motions follow their priors.
         fixed = [held.release is not None, self.two and held.tilt, self.two and held.scale]
         self.degrees = (13 if self.two else 3) - sum(fixed)
 
     def but(self, **changed: Any) -> Likelihood:
-        """Return the same with another film, touch, speed or number of powers."""
-        known = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "speed", "orders")}
+        """Return the same with another film, touch, speed or number of motions."""
+        known = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "speed", "count")}
         return Likelihood(**known | changed)
 
     def _priors(self) -> tuple[FloatArray, FloatArray]:
@@ -184,7 +178,9 @@ class Likelihood:
         if self.two:
             priors["log_hand"] = float(np.log(HAND[0])), HAND[1]
             hand = [name for name in self.names if name.startswith("hand_")]
-            priors |= {name: (0.0, size) for name, size in zip(hand, PULL * self.orders, strict=True)}
+            priors |= {name: (0.0, size) for name, size in zip(hand, PULL * self.count, strict=True)}
+            if self.count > 1:
+                priors |= {name: (lift, JUMP * size) for name, lift, size in zip(hand, LIFT, PULL, strict=False)}
             if held.tilt:
                 priors["ax"] = 0.0, TIGHT
         elif self.film.quantity == "omega":
@@ -204,7 +200,7 @@ class Likelihood:
         tilt = np.arctan2(x[n["ax"]], -x[n["ay"]]) if self.two else 0.0
         turning = curve.at(abs(omega0) * tau, omega0, theta0 - tilt)
         if self.two:
-            values, slopes = points(turning, film.t, x)
+            values, slopes = points(turning, film.t, x, self.hands, APART)
             return values, slopes
         f, w, _, _, f_omega, _, f_theta, _ = turning
         sign = np.sign(omega0)
@@ -225,7 +221,7 @@ class Likelihood:
             slopes = np.zeros((len(t), len(x)))
             slopes[:, -1] = 2 * np.exp(2 * x[-1])
             return np.full(len(t), np.exp(2 * x[-1])), slopes
-        variance, slopes = variances(t, x, self.touch, self.speed, self.area / (2 * np.pi))
+        variance, slopes = variances(t, x, self.touch, self.speed, self.area / (2 * np.pi), self.power)
         return variance, slopes
 
     # ------------------------------------------------------------------ densities
@@ -240,7 +236,7 @@ class Likelihood:
         """Return the cost of all clicks had the touch been at each of some times, shape (len(times),)."""
         values, _ = self.model(curve, x)
         t, most = self.film.t, self.area / (2 * np.pi)
-        variance, _ = variances(t, x, np.inf, 0.0, most)
+        variance, _ = variances(t, x, np.inf, 0.0, most, self.power)
         squares = (np.where(self.seen[:, :, None], self.film.values - values, 0.0) ** 2).sum(axis=2)
         return np.asarray(ended(squares, self.seen, variance, t, times, speed, most, np.log1p(-BAD), self.log_bad))
 
@@ -267,6 +263,13 @@ class Likelihood:
         gradient += pull
         information.flat[:: len(x) + 1] += self.stiffness
         cost = 0.5 * float(away @ pull)
+        if self.count > 1:  # Student's where the normal one was added
+            values = slice(10, 13)
+            far = pull[values] * away[values] / FREEDOM
+            less = (1.0 + 1.0 / FREEDOM) / (1.0 + far) - 1.0
+            cost += 0.5 * float(((FREEDOM + 1.0) * np.log1p(far) - FREEDOM * far).sum())
+            gradient[values] += less * pull[values]
+            information[range(10, 13), range(10, 13)] += less * self.stiffness[values]
         if self.two and self.held.scale:
             down = float(np.hypot(x[7], x[8]))
             row = x[7:9] / (down * TIGHT)

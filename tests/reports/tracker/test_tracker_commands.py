@@ -137,7 +137,7 @@ def exported(tmp_path, *arguments):
 
 
 def test_export_lays_cap_base_and_centre_over_the_video(tmp_path):
-    path = exported(tmp_path, "--speed", 2, "--launch-angle", 70, "--frame-rate", 120)
+    path = exported(tmp_path, "--frame-rate", 120)
     header, *rows = path.read_text(encoding="utf-8").splitlines()
     assert header == "t\txcap\tycap\txbase\tybase\txcm\tycm"
     values = np.array([[float(cell) for cell in row.split("\t")] for row in rows])
@@ -145,7 +145,7 @@ def test_export_lays_cap_base_and_centre_over_the_video(tmp_path):
     assert np.diff(t) == pytest.approx(1 / 120, abs=2e-9)
     assert len(t) == 61
     assert np.hypot(*(base - cap).T) == pytest.approx(0.28, abs=3e-9)
-    velocity = 2 * np.array([math.cos(math.radians(70)), math.sin(math.radians(70))])
+    velocity = Scenario().launch_velocity
     fall = np.outer(t * t, [0.0, -9.81 / 2])
     assert np.abs(centre - centre[0] - np.outer(t, velocity) - fall).max() < 1e-8
     assert cap[0] == pytest.approx([0.0, 0.0], abs=1e-9)
@@ -158,8 +158,8 @@ def test_export_lays_cap_base_and_centre_over_the_video(tmp_path):
 
 
 def test_export_and_back(tmp_path):
-    path = exported(tmp_path, "--start", 1.5, "--origin", "0.2,1.1", "--length-unit", "cm", "--delimiter", "semicolon")
-    film = read_film([path], cap="cap", base="base", length_unit="cm")
+    path = exported(tmp_path, "--start", 1.5, "--origin", "0.2,1.1")
+    film = read_film([path], cap="cap", base="base", length_unit="m")
     assert film.t[0] == 1.5
     assert film.angle[0] == pytest.approx(math.pi / 2, abs=1e-6)
     assert film.values[0, 0] == pytest.approx([0.2, 1.1], abs=1e-6)
@@ -183,8 +183,6 @@ def test_export_to_standard_output(capsys):
     ("arguments", "words"),
     [
         (("--frame-rate", "0"), r"frame_rate = 0.0 1/s is outside \[1, 100000\]"),
-        (("--speed", "-2"), r"speed = -2 m/s is outside \[0, inf\)"),
-        (("--length-unit", "inch"), "length_unit = 'inch' is unknown"),
         (("--out", "/none/where.txt"), "the folder /none does not exist"),
         (("--out", str(EXAMPLES)), "is a folder; name a file"),
     ],
@@ -202,7 +200,7 @@ def test_a_duration_of_too_many_frames_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "arguments", [("--speed", "fast"), ("--origin", "1;2"), ("--origin", "1,x"), ("--speed", "nan")]
+    "arguments", [("--start", "soon"), ("--origin", "1;2"), ("--origin", "1,x"), ("--start", "nan")]
 )
 def test_arguments_that_are_no_numbers(arguments, capsys):
     with pytest.raises(SystemExit) as exit_status:

@@ -12,10 +12,10 @@ import numpy as np
 from slicemodel.compiled import inner, kept_on_disk
 
 QUICK = 0.05
-"""Time in which the acceleration of a hand changes, by which its derivatives are scaled [s]."""
+"""Time by which the powers of time before the release are scaled [s]."""
 
 STEADY = 2.5
-"""Least size of the first derivative that is not fitted, scaled alike [m/s^2]: no hand is as steady as a flight."""
+"""Least size of what a hand does beyond its motions [m/s^2]: no hand is as steady as a flight."""
 
 
 @kept_on_disk()
@@ -52,26 +52,29 @@ def curve_at(rows, slopes, step, moved, s):
 
 
 @kept_on_disk()
-def points(turning, t, x):
+def points(turning, t, x, hands, apart):
     """Return the cap's and the base's meant places (2, P, 2), and their slopes by the inner parameters (2, P, 2, K).
 
-    ``turning`` is what ``curve_at`` gives at |omega_0| (t - release).
+    ``turning`` is what ``curve_at`` gives at |omega_0| (t - release); ``hands`` (3, J, M) are motions of a hand, their
+    velocities and accelerations at times ``apart`` before the release, between which accelerations are straight.
     """
     values, slopes = np.zeros((2, len(t), 2)), np.zeros((2, len(t), 2, len(x)))
-    omega0, length, orders = x[2], x[9], (len(x) - 12) // 3
+    omega0, length, count, last = x[2], x[9], (len(x) - 12) // 3, hands.shape[1] - 2
     sign = math.copysign(1.0, omega0)
     for i in range(len(t)):
         f, w, r, dr, f_omega, r_omega, f_theta, r_theta = turning[:, i]
         tau = t[i] - x[0]
-        # Before the release a hand adds powers of tau, the second and so on, to C_M and to theta.
-        hand, rate, bend = np.zeros(3), np.zeros(3), np.zeros(orders)
-        power = min(tau, 0.0)
-        for order in range(orders):
-            first = 10 + 3 * order
-            rate += power * x[first : first + 3]
-            bend[order] = power * min(tau, 0.0) / (order + 2)
-            hand += bend[order] * x[first : first + 3]
-            power = bend[order] / QUICK
+        hand, rate, bend = np.zeros(3), np.zeros(3), np.zeros(count)
+        if tau < 0.0:
+            k = min(int(-tau / apart), last)
+            s = -tau - k * apart
+            for order in range(count):
+                place, velocity, pull = hands[:, k, order]
+                jerk = (hands[2, k + 1, order] - pull) / apart
+                bend[order] = place - s * (velocity - s * (pull / 2 + s * jerk / 6))
+                first = 10 + 3 * order
+                hand += bend[order] * x[first : first + 3]
+                rate += (velocity - s * (pull + s * jerk / 2)) * x[first : first + 3]
         theta = x[1] + sign * f + hand[2]
         u = (math.sin(theta), -math.cos(theta))
         across = (-u[1], u[0])
@@ -90,22 +93,22 @@ def points(turning, t, x):
                 slope[0] -= x[5 + d] + tau * x[7 + d] + rate[d]
                 slope[3 + d], slope[5 + d], slope[7 + d] = 1.0, tau, 0.5 * tau**2
                 slope[9] = along * u[d]
-                for order in range(orders):
+                for order in range(count):
                     slope[10 + 3 * order + d] = bend[order]
                     slope[12 + 3 * order] = length * along * bend[order] * across[d]
     return values, slopes
 
 
 @kept_on_disk()
-def variances(t, x, touch, speed, most):
+def variances(t, x, touch, speed, most, power):
     """Return the variance of one coordinate of a click (P,), and its slopes by the inner parameters (P, K).
 
-    A hand adds to it before the release, and a table that takes a velocity ``speed`` after the touch; both level off
-    at ``most``, beyond the picture.
+    A hand adds to it before the release, by a ``power`` of time, and a table that takes a velocity ``speed`` after the
+    touch; both level off at ``most``, beyond the picture.
     """
     variance, slopes = np.empty(len(t)), np.zeros((len(t), len(x)))
-    at, orders = len(x) - 2, (len(x) - 12) // 3
-    sigma, scale, power = math.exp(2 * x[at]), 1 / math.gamma(orders + 3) / QUICK**orders, orders + 2
+    at = len(x) - 2
+    sigma, scale = math.exp(2 * x[at]), 1 / math.gamma(power + 1) / QUICK ** (power - 2)
     hand = scale * (STEADY + math.exp(x[at + 1]))
     for i in range(len(t)):
         before = min(t[i] - x[0], 0.0)

@@ -110,26 +110,18 @@ def until_landing(run: Trajectory, frames: Trajectory, height: float) -> tuple[T
     return at_times(frames, frames.t[frames.t <= touchdown.moment.time]), words
 
 
-def data_track_text(
-    run: Trajectory,
-    *,
-    start: float = 0.0,
-    origin: tuple[float, float] = (0.0, 0.0),
-    metres: float = 1.0,
-    delimiter: str = "\t",
-) -> str:
-    """Return cap, base and C_M of a run in the lab (Eq. 2) as the table of a data track, with nine decimals.
+def data_track_text(run: Trajectory, *, start: float = 0.0, origin: tuple[float, float] = (0.0, 0.0)) -> str:
+    """Return cap, base and C_M of a run in the lab (Eq. 2) as the table of a data track in metres, with nine decimals.
 
     Parameters
     ----------
     start : time of the release in the video [s]
     origin : place of the cap at release on the video's axes [m]
-    metres : length of the video's unit [m]
     """
     motion = lab_motion(run)
     columns = [run.t + start]
     for points in (motion.cap, motion.base, motion.centre):
-        columns += list(((points + origin) / metres).T)
-    rows = [delimiter.join(("t", "xcap", "ycap", "xbase", "ybase", "xcm", "ycm"))]
-    rows += [delimiter.join(f"{value:.9f}" for value in row) for row in np.round(np.column_stack(columns), 9) + 0.0]
+        columns += list((points + origin).T)
+    rows = ["\t".join(("t", "xcap", "ycap", "xbase", "ybase", "xcm", "ycm"))]
+    rows += ["\t".join(f"{value:.9f}" for value in row) for row in np.round(np.column_stack(columns), 9) + 0.0]
     return "\n".join(rows) + "\n"

@@ -21,9 +21,8 @@ from slicemodel.scenario import UnsuitableFileError, refuse_devices, unknown_nam
 from slicemodel.trajectory import FloatArray
 
 METRES: Final = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001})
-RADIANS: Final = MappingProxyType({"deg": np.pi / 180, "rad": 1.0})
 SECONDS: Final = MappingProxyType({"s": 1.0, "ms": 1e-3})
-"""Units of lengths, angles and times by name, in SI."""
+"""Units of lengths and times by name, in SI."""
 
 
 class TrackFileError(ValueError):
