@@ -38,6 +38,7 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
     "seventh": patches("seventh"),
     "eighth": patches("eighth"),
     "ninth": patches("ninth"),
+    "tenth": patches("tenth"),
     "right": dict(RIGHT),
 }
 """Mistakes by list and name, and solvers without one."""

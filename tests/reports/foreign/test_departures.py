@@ -64,7 +64,7 @@ BOUNCING = replace(WEIGHTLESS, damping=0.0, angle=5.0)
         (
             lambda _, throw: replace(throw, restitution=0.9 * throw.restitution),
             BOUNCING,
-            ["with an impact, in none of", "of its right speed, the others are right"],
+            ["with an impact, in none of", "leaves as if e were 0.45 where it is 0.5, and the others are right"],
         ),
     ],
 )

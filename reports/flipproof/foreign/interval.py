@@ -1,0 +1,143 @@
+"""What lies between two outputs of a solver, and what its equation makes of the state at the first one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+import ode_reference
+from flipproof.foreign.contract import Answer, Ask, Started
+from flipproof.foreign.place import switches_of
+from flipproof.frame.twins import usual_rest_speed
+from slicemodel.observables import moment_of_inertia
+from slicemodel.trajectory import BASE, CAP, FloatArray
+
+FIELDS: Final = ("theta", "omega", "r", "v")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interval:
+    """What lies between two outputs of a solver, [begin, end] in each array, and where it departs.
+
+    Parameters
+    ----------
+    number : int - of the throw
+    throw : Started - the throw from the solver's state at its first output
+    theta, omega, r, v : arrays, shapes (2,), (2,), (2, N), (2, N) - what the solver answers; SI units
+    due : mapping - by field what the equation gives at the second output
+    hits : tuple of (slice, end, time) - impacts in the equation
+    before, after : array, shape (N,) - end on which each slice rests at either output in the equation, or 0
+    departure : mapping
+        By field the largest difference from ``due``, a fraction of its scale; of omega that from what the solver's own
+        places make of the angular momentum.
+    faint : float - departure of v that a rest speed of another size may make
+    """
+
+    number: int
+    throw: Started
+    theta: FloatArray
+    omega: FloatArray
+    r: FloatArray
+    v: FloatArray
+    due: Mapping[str, FloatArray]
+    hits: tuple[tuple[int, int, float], ...]
+    before: FloatArray
+    after: FloatArray
+    departure: Mapping[str, float]
+    faint: float
+
+    @property
+    def size(self) -> float:
+        """The largest departure of any field beyond what is faint, 0 if none is."""
+        room = self.faint if self.hits or self.before.any() or self.after.any() else 0.0
+        return max((d for name, d in self.departure.items() if d > room * (name != "theta")), default=0.0)
+
+    @property
+    def together(self) -> bool:
+        """Whether several slices strike at one instant."""
+        times = sorted(time for _, _, time in self.hits)
+        return any(b - a < 1e-9 * self.throw.duration for a, b in pairwise(times))
+
+    def strikes(self, end: int) -> bool:
+        """Return whether a slice strikes an end."""
+        return any(side == end for _, side, _ in self.hits)
+
+    def strikes_beside(self, end: int, resting: int) -> bool:
+        """Return whether a slice strikes an end while others rest on ``resting``."""
+        others = np.flatnonzero(self.before == resting).tolist()
+        return any(side == end and set(others) - {who} for who, side, _ in self.hits)
+
+    def rests(self, end: int) -> bool:
+        """Return whether a slice rests on an end at both outputs."""
+        return bool(np.any((self.before == end) & (self.after == end)))
+
+    def settles(self, end: int) -> bool:
+        """Return whether a slice comes to rest on an end."""
+        return bool(np.any((self.before != end) & (self.after == end)))
+
+    def leaves(self, end: int) -> bool:
+        """Return whether a slice is let go from an end."""
+        return bool(np.any((self.before == end) & (self.after != end)))
+
+
+def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Interval]:
+    """Carry on from the state at each output to the next."""
+    throw, switches = ask.scenario, switches_of(equation)
+    given = {f.name: getattr(throw, f.name) for f in fields(throw)}
+    length, spin = throw.bottle.length, abs(throw.omega0)
+    rest_speed = usual_rest_speed(switches.name)
+    scale = {"theta": 1.0, "omega": spin, "r": length, "v": length * spin}
+    assert answer.r is not None
+    assert answer.v is not None
+    intervals = []
+    for k in range(len(answer.t) - 1):
+        rows = slice(k, k + 2)
+        r, v = answer.r[rows], answer.v[rows]
+        if not all(np.isfinite(x).all() for x in (answer.theta[rows], answer.omega[rows], r, v)):
+            break
+        places = np.clip(r[0], throw.r_min, throw.r_max)
+        begun = given | {
+            "theta0": float(answer.theta[k]),
+            "omega0": float(answer.omega[k]),
+            "duration": float(answer.t[k + 1] - answer.t[k]),
+        }
+        try:
+            state = Started(**begun, places=tuple(places.tolist()))
+            flight = ode_reference.solve(state, switches, [0.0, state.duration], speeds=v[0])
+        except ValueError:
+            break  # a state that is no throw: the answer has gone astray long before
+        if len(flight.t) < 2 or flight.impacts is None:
+            break
+        due = {name: getattr(flight, name)[-1] for name in FIELDS}
+        inertia = moment_of_inertia(throw, np.array([places, r[1]]))
+        due["omega"] = answer.omega[k] * inertia[0] / inertia[1]
+        difference = {name: np.max(np.abs(getattr(answer, name)[k + 1] - due[name])) / scale[name] for name in FIELDS}
+        intervals.append(
+            Interval(
+                number=number,
+                throw=state,
+                theta=answer.theta[rows],
+                omega=answer.omega[rows],
+                r=r,
+                v=v,
+                due=due,
+                hits=tuple(
+                    zip(*(getattr(flight.impacts, name).tolist() for name in ("slice", "end", "time")), strict=True)
+                ),
+                before=_resting(throw, places, v[0], 2 * rest_speed),
+                after=_resting(throw, due["r"], due["v"], 0.0),
+                departure={name: float(value) for name, value in difference.items()},
+                faint=3 * rest_speed / scale["v"],
+            )
+        )
+    return intervals
+
+
+def _resting(throw: Any, r: FloatArray, v: FloatArray, rest_speed: float) -> FloatArray:
+    """Return the end on which each slice rests, 0 if on none."""
+    still, near = np.abs(v) <= rest_speed, 1e-6 * throw.bottle.length
+    return np.where(still & (r >= throw.r_max - near), BASE, np.where(still & (r <= throw.r_min + near), CAP, 0))
