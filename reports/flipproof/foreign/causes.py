@@ -19,6 +19,9 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool) -> str:
 
     ``recoil`` says whether an impact moves the tube in its equation.
     """
+    still = [i.time for i in intervals if np.ptp(i.theta) == 0.0]
+    if len(still) > 0.8 * len(intervals):
+        return f"the answer stands still there, first at t = {min(still):.3g} s"
     if all(not np.any(i.v) and not np.any(np.diff(i.r, axis=0)) for i in intervals):
         return "its slices do not move: look at what is taken for ice"
     known = _of_angle(intervals) or _of_time(intervals)

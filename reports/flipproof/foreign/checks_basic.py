@@ -377,7 +377,8 @@ def check_velocity(traits: Traits) -> Making:
         expected=f"v = dr/dt within {bound:.1g} of the largest v, or a difference that falls with refinement",
         came=f"off by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
         where="0.05 s",
-        advice="v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
+        advice=_own_times(answers[0])
+        + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )
 

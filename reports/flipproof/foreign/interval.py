@@ -25,7 +25,7 @@ class Interval:
 
     Parameters
     ----------
-    number : int - of the throw
+    number, time : int, float - of the throw, and when the interval begins [s]
     throw : Started - the throw from the solver's state at its first output
     theta, omega, r, v : arrays, shapes (2,), (2,), (2, N), (2, N) - what the solver answers; SI units
     due : mapping - by field what the equation gives at the second output
@@ -38,6 +38,7 @@ class Interval:
     """
 
     number: int
+    time: float
     throw: Started
     theta: FloatArray
     omega: FloatArray
@@ -119,6 +120,7 @@ def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Int
         intervals.append(
             Interval(
                 number=number,
+                time=float(answer.t[k]),
                 throw=state,
                 theta=answer.theta[rows],
                 omega=answer.omega[rows],

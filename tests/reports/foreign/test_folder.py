@@ -52,7 +52,7 @@ def test_answers_by_files_get_a_verdict(tmp_path):
     found = certify(first)
     assert first.waiting
     assert {r.verdict for r in found.results} == {WAITING, IDLE}
-    assert "22 waiting, 1 not applicable (published-vectors: " in found.conclusion
+    assert "23 waiting, 1 not applicable (published-vectors: " in found.conclusion
     for _ in range(8):  # further questions depend on the answers
         answer_all(folder, opened("midpoint"))
         runner = Folder(folder)
@@ -106,7 +106,7 @@ def test_the_command_says_how_many_questions_wait(tmp_path, capsys):
     assert main(["certify", f"csv:{tmp_path / 'answers'}", "--equation", "eq8"]) == 1
     said = capsys.readouterr().out
     assert f"{len(questions(tmp_path / 'answers'))} questions wait for answer.csv" in said
-    assert " of 21 checks wait" in said
+    assert " of 22 checks wait" in said
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node")
