@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import combinations
 
 import numpy as np
@@ -24,12 +25,14 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool) -> str:
         return f"the answer stands still there, first at t = {min(still):.3g} s"
     if all(not np.any(i.v) and not np.any(np.diff(i.r, axis=0)) for i in intervals):
         return "its slices do not move: look at what is taken for ice"
-    known = _of_angle(intervals) or _of_time(intervals)
-    if known:
-        return known
-    if all(i.hits for i in intervals):
-        return _of_impacts(intervals, recoil=recoil)
-    return _of_inertia(intervals) or _of_motion(intervals)
+    # What is answered may be anything; a number beyond all bounds has no cause to be found.
+    with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
+        if known := _of_angle(intervals) or _of_time(intervals):
+            return known
+        if all(i.hits for i in intervals):
+            return _of_impacts(intervals, recoil=recoil)
+        return _of_inertia(intervals) or _of_motion(intervals)
+    return ""
 
 
 def rms(values: ArrayLike) -> float:
@@ -53,7 +56,7 @@ def _of_time(intervals: Sequence[Interval]) -> str:
     """Return that the solver is at another time than it says, if theta and the places say so alike."""
     late, off, moved = [], [], []
     for i in intervals:
-        delay = float(i.due["theta"] - i.theta[1]) / float(i.omega[1])
+        delay = float((i.due["theta"] - i.theta[1]) / i.omega[1])
         flies = (i.after == 0) & (i.before == 0)
         late.append(delay)
         off += ((i.due["r"] - i.r[1])[flies] - i.due["v"][flies] * delay).tolist()

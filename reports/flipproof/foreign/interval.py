@@ -132,7 +132,7 @@ def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Int
                 ),
                 before=_resting(throw, places, v[0], 2 * rest_speed),
                 after=_resting(throw, due["r"], due["v"], 0.0),
-                departure={name: float(value) for name, value in difference.items()},
+                departure={name: min(float(value), 1e3) for name, value in difference.items()},  # its square is finite
                 faint=3 * rest_speed / scale["v"],
             )
         )

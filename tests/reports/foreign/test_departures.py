@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from planted import InProcess, patches
 
@@ -146,3 +147,15 @@ def test_the_check_fails_where_the_solver_departs():
     assert result.verdict == FAILED
     assert "departs in" in result.line
     assert "-0.02 x g cos(theta) besides" in result.line
+
+
+def test_answers_beyond_all_bounds_break_nothing():
+    def beyond(_, __, flight):
+        late = flight["t"] > flight["t"][-1] / 2
+        return flight | {name: np.where(late, 1e300, flight[name]) for name in ("theta", "omega")}
+
+    def without_spin(_, __, flight):
+        return flight | {"omega": np.where(flight["t"] > 0.01, 0.0, flight["omega"])}
+
+    for spoilt in (beyond, without_spin):
+        assert told(Exact, WHOLE, spoilt=spoilt)
