@@ -17,12 +17,14 @@ from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.checking import drive
 from flipproof.foreign.contract import IMPACT, Ask, ForeignError, started
+from flipproof.foreign.departures import departing
 from flipproof.foreign.elsewhere import (
     COUNT,
     FACTORS,
     FULL,
     PAPER,
     SEED,
+    STICKY,
     WHOLE,
     confirmed,
     designed,
@@ -399,9 +401,14 @@ def test_a_rest_that_holds_too_long_is_seen_and_named():
             ),
         ),
     )
-    (result,) = certify(InProcess(held.solver(), "x"), ["equation"]).results
+    solver = InProcess(held.solver(), "x")
+    (result,) = certify(solver, ["equation"]).results
     assert result.verdict == FAILED
     assert "right without weight, and without rests: look at rests" in result.line
+    departures = departing(replace(solver.traits, refined_by=None), "eq8", [WHOLE.ask(0), STICKY.ask(0)])
+    came, advice = drive(departures, lambda ask: solver(replace(ask, effort=ask.scenario.duration / 1000)))
+    assert "in which a slice is let go" in came
+    assert advice == "look at when a slice at rest is let go"
 
 
 def test_throws_are_drawn_anew_by_a_seed():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import InProcess, patches
+from planted import InProcess
 
 import ode_reference
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
@@ -94,29 +94,6 @@ def half_of_own_inertia(_, throw, flight):
 )
 def test_an_answer_that_is_wrong_is_named(spoilt, words):
     assert words in told(Exact, WHOLE, spoilt=spoilt)
-
-
-def test_rests_that_end_late_are_told_from_all_else():
-    held = replace(
-        patches("right")["eq8_as_switches"],
-        base="eq8",
-        changes=(
-            (
-                "            if after < -1e-7:\n",
-                "            self.lifted = getattr(self, 'lifted', self.t) if after < -1e-7 else self.t + used\n"
-                "            if after < -1e-7 and self.t + used - self.lifted >= 0.007:\n",
-            ),
-        ),
-    )
-    solve = held.solver()
-
-    class Held(Exact):
-        refined_by = None
-
-        def solve(self, ask):
-            return solve(replace(ask, effort=ask.scenario.duration / 1000))
-
-    assert "look at when a slice at rest is let go" in told(Held, WHOLE, STICKY)
 
 
 def test_a_solver_without_speeds_is_not_asked():
