@@ -106,7 +106,7 @@ FEW: Final = 3
 """Intervals that depart before anything is said: rounding may put one impact before an output or behind it."""
 
 SURE: Final = 0.9
-"""Share of the departures that a sort must hold, and share of its intervals that must depart, to be told."""
+"""Share of the departures that a sort must hold where none holds them all."""
 
 
 Departing = Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]
@@ -210,7 +210,7 @@ def _told(equation: str, intervals: Sequence[Interval], astray: BoolArray) -> tu
     both, count = int(np.sum(members & astray)), int(members.sum())
     others = f", in {wrong - both or 'none'} of the {len(intervals) - count} others" if words else ""
     came = f"in {both} of {count} intervals between two outputs{words and ' ' + words}{others}"
-    departed = [interval for interval, both_ in zip(intervals, members & astray, strict=True) if both_]
+    departed = [interval for interval, departs in zip(intervals, members & astray, strict=True) if departs]
     what = cause_of(departed, recoil=switches_of(equation).recoil)
     if "look at" in what or (what and look_at in ("weight", "drag")):  # the terms are named
         look_at = ""
