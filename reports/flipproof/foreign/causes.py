@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flipproof.foreign.interval import FIELDS, Interval
+from flipproof.foreign.interval import FIELDS, FLOOR, Interval
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass
 from slicemodel.trajectory import FloatArray
@@ -132,7 +132,7 @@ def _of_angle(intervals: Sequence[Interval]) -> str:
 
 def _of_inertia(intervals: Sequence[Interval]) -> str:
     """Return which part of J is another than by definition: the factors of its parts with which J omega is constant."""
-    if _worst(intervals)["omega"] < 3e-6:
+    if _worst(intervals)["omega"] < FLOOR:
         return ""
     numbers = [i.number for i in intervals]
     intervals = [i for i in intervals if i.number == max(set(numbers), key=numbers.count)]

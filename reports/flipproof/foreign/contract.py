@@ -85,8 +85,13 @@ def started(ask: Ask) -> Scenario:
     throw = ask.scenario
     if np.array_equal(ask.start, throw.initial_positions()):
         return throw
-    given = {f.name: getattr(throw, f.name) for f in fields(throw)}
-    return Started(**given, places=tuple(ask.start.tolist()))
+    return begun(throw, ask.start)
+
+
+def begun(throw: Scenario, places: FloatArray, **changed: float) -> Started:
+    """Return a throw let go at ``places``, shape (N,) [m], with some of its numbers changed."""
+    given = {f.name: getattr(throw, f.name) for f in fields(Scenario)}
+    return Started(**(given | changed), places=tuple(places.tolist()))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

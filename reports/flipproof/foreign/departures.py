@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flipproof.foreign.causes import cause_of, rms
 from flipproof.foreign.checking import NotApplicableError, effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
-from flipproof.foreign.interval import Interval, carried_on
+from flipproof.foreign.interval import FLOOR, Interval, carried_on
 from flipproof.foreign.place import switches_of
 from slicemodel.trajectory import BASE, CAP
 
@@ -26,11 +26,8 @@ BoolArray = NDArray[np.bool_]
 OUTPUTS: Final = 160
 """Outputs of a throw at which the reference begins anew."""
 
-FLOOR: Final = 3e-6
-"""Departure between two outputs, a fraction of the field's scale, that counts for none."""
-
 LOCATED: Final = 1e-4
-"""The same across an impact, whose time may be found by a tolerance."""
+"""``FLOOR`` across an impact, whose time may be found by a tolerance."""
 
 LEVELS: Final = (0, 2, 4)
 """Levels of refinement; the last one only of what departs at the others."""

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 
 import ode_reference
-from flipproof.foreign.contract import Answer, Ask, Started
+from flipproof.foreign.contract import Answer, Ask, Started, begun
 from flipproof.foreign.place import switches_of
 from flipproof.frame.twins import usual_rest_speed
 from slicemodel.observables import moment_of_inertia
 from slicemodel.trajectory import BASE, CAP, FloatArray
 
 FIELDS: Final = ("theta", "omega", "r", "v")
+
+FLOOR: Final = 3e-6
+"""Departure between two outputs, a fraction of the field's scale, that counts for none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +91,6 @@ class Interval:
 def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Interval]:
     """Carry on from the state at each output to the next."""
     throw, switches = ask.scenario, switches_of(equation)
-    given = {f.name: getattr(throw, f.name) for f in fields(throw)}
     length, spin = throw.bottle.length, abs(throw.omega0)
     rest_speed = usual_rest_speed(switches.name)
     scale = {"theta": 1.0, "omega": spin, "r": length, "v": length * spin}
@@ -101,14 +103,10 @@ def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Int
         if not all(np.isfinite(x).all() for x in (answer.theta[rows], answer.omega[rows], r, v)):
             break
         places = np.clip(r[0], throw.r_min, throw.r_max)
-        begun = given | {
-            "theta0": float(answer.theta[k]),
-            "omega0": float(answer.omega[k]),
-            "duration": float(answer.t[k + 1] - answer.t[k]),
-        }
+        theta, omega, span = float(answer.theta[k]), float(answer.omega[k]), float(answer.t[k + 1] - answer.t[k])
         try:
-            state = Started(**begun, places=tuple(places.tolist()))
-            flight = ode_reference.solve(state, switches, [0.0, state.duration], speeds=v[0])
+            state = begun(throw, places, theta0=theta, omega0=omega, duration=span)
+            flight = ode_reference.solve(state, switches, [0.0, span], speeds=v[0])
         except ValueError:
             break  # a state that is no throw: the answer has gone astray long before
         if len(flight.t) < 2 or flight.impacts is None:
