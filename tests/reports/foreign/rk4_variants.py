@@ -1,4 +1,4 @@
-"""The naive Runge-Kutta solver of the examples, declaring nothing."""
+"""The naive Runge-Kutta solver of the examples with other numbers than the throw's, and one that declares nothing."""
 
 import sys
 from pathlib import Path
@@ -13,3 +13,15 @@ class Undeclared(Eq8):
     name = "undeclared"
     equation = None
     order = None
+
+
+class RestitutionLow(Eq8):
+    """Restitution 10 % too low."""
+
+    restitution = 0.9
+
+
+class DragHigh(Eq8):
+    """Drag 5 % too high."""
+
+    drag = 1.05

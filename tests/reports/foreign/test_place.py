@@ -73,6 +73,17 @@ def test_a_naive_runge_kutta_lands_on_its_equation(spec, equation):
     assert found.following_distance >= 5 * found.distance
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["RestitutionLow", "DragHigh"])
+def test_wrong_constants_of_another_solver_are_off_the_lattice(name):
+    """The good solver of free flight has the same two below."""
+    found = placed(f"{VARIANTS}:{name}")
+    assert not found.on_lattice
+    assert found.distance > 5 * found.room
+    assert "off the lattice" in found.text
+    assert "restitution, drag or mass" in found.advice
+
+
 @pytest.mark.parametrize("name", ["RestitutionLow", "DragFivePercent", "ElasticCap", "StickForEver"])
 def test_wrong_constants_impacts_and_rests_are_off_the_lattice(name):
     """Impacts change omega(t) little where drag is strong; one throw is there for them."""
