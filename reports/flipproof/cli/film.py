@@ -82,6 +82,7 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--slices", type=count, metavar="N", help="slices of every throw, gamma unchanged (50)")
     command.add_argument("--release", type=number, metavar="S", help="known time of release by the film's clock [s]")
     command.add_argument("--landing", type=number, metavar="S", help="known time of the touch by the film's clock [s]")
+    command.add_argument("--table-height", type=number, metavar="M", help="known y of the table in the picture [m]")
     command.add_argument("--noise", type=_positive, metavar="S", help="known noise of one coordinate [m, rad, rad/s]")
     command.add_argument(
         "--hold", nargs="+", default=[], choices=("tilt", "scale"), help="known: the camera is level; the picture's "
@@ -152,8 +153,8 @@ def _estimate(options: argparse.Namespace, paths: tuple[Path, ...], scenario: An
     if options.release is not None and options.landing is not None and not options.release < options.landing:
         raise ValueError(f"landing = {options.landing:g} s does not follow release = {options.release:g} s")
     held = Held(
-        release=options.release, touch=options.landing, tilt="tilt" in options.hold, scale="scale" in options.hold,
-        noise=options.noise,
+        release=options.release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
+        scale="scale" in options.hold, noise=options.noise,
     )  # fmt: skip
     with progress_bar(solver, "flight") as step:
         seconds = 60.0 * options.minutes

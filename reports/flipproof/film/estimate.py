@@ -477,6 +477,9 @@ def _touches(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[Float
     step = float(np.median(np.diff(film.t)))
     if likelihood.held.touch is not None or not likelihood.two or not (film.t > x[0]).any():
         return np.array([likelihood.touch, likelihood.touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
+    if likelihood.held.table is not None:
+        touch = _at_table(likelihood, curve, x, likelihood.held.table)
+        return np.array([touch, touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
     frames = np.append(film.t[film.t > x[0]], film.t[-1] + step)
     rough = {speed: likelihood.touches(curve, x, frames, speed) for speed in TOUCH}
     speed = min(rough, key=lambda velocity: float(rough[velocity].min()))
@@ -485,6 +488,22 @@ def _touches(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[Float
     # How fast the table takes the velocity, and since when, look alike.
     costs = [likelihood.touches(curve, x, times, velocity) for velocity in TOUCH]
     return times, -np.asarray(np.logaddexp.reduce(-np.array(costs), axis=0)), speed
+
+
+def _at_table(likelihood: Likelihood, curve: Curve, x: FloatArray, height: float) -> float:
+    """Return when the fitted bottle, falling, comes down to the table with an end."""
+    film = likelihood.film
+    times = np.linspace(float(x[0]), float(film.t[-1]), 2000)
+    dense = replace(film, t=times, values=np.zeros((2, len(times), 2)), lines=np.zeros(len(times), dtype=np.int64))
+    values, _ = Likelihood(dense, Held(), np.inf, 1.0).model(curve, x)
+    lowest = values[:, :, 1].min(axis=0)
+    below = np.flatnonzero((lowest[1:] <= height) & (lowest[:-1] > height))
+    if not len(below):
+        raise ValueError(
+            f"{film.label}: table_height = {height:g} m: the bottle never comes down to it; its lowest end is in "
+            f"[{lowest.min():.4g}, {lowest.max():.4g}] m"
+        )
+    return float(times[below[-1] + 1])
 
 
 def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
@@ -502,8 +521,8 @@ def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
 def exchange_gain(one: Estimate, doubted: float) -> float:
     """Return by how much the clicks become likelier (logarithm) if cap and base are exchanged; -inf without a flight.
 
-    First guesses are compared; where these gain more than ``doubted``,
-    as they did in 1 of 30 right films, both labels are estimated and compared.
+    First guesses are compared; where these gain more than ``doubted``, as they did in 1 of 30 right films, both labels
+    are estimated and compared.
     """
     film = one.film
     try:

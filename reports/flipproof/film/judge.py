@@ -190,6 +190,8 @@ class Judged:
                     "or other things clicked?"
                 )
             self._check_release()
+        if film.quantity != "omega":
+            self._check_rates()
 
     def _check_release(self) -> None:
         """Refuse a release before which the bottle falls freely already."""
@@ -202,6 +204,31 @@ class Judged:
                 "falls freely by its clicks alone: the flight begins earlier, and no fit was found that says so: click "
                 "the frames there again, or give --release"
             )
+
+    def _check_rates(self) -> None:
+        """Refuse an omega_0 that is not the slope of the clicked angle, and a plateau above it."""
+        estimate, film = self.estimate, self.estimate.film
+        t, omega0, sign = film.t[self.flying], estimate.best["omega0"], math.copysign(1.0, estimate.best["omega0"])
+        theta, fitted = self.theta[self.flying], self.fitted[0][self.flying]
+        size = math.sqrt(2.0) * self.noise / estimate.best["length"] if estimate.likelihood.two else self.noise
+        early = t <= max(float(t[0]) + 0.06, float(t[min(4, len(t) - 1)]))
+        late = t >= (t[0] + t[-1]) / 2
+        for which, words in ((early, "after the release"), (late, "in the second half")):
+            if which.sum() < 3:
+                continue
+            clock = t[which] - t[which].mean()
+            spread = size / math.sqrt(float(clock @ clock))
+            slope, meant = (float(clock @ y[which]) / float(clock @ clock) for y in (theta, fitted))
+            if abs(slope - meant) > 6 * spread + 0.1 * abs(omega0):
+                raise UnsoundError(
+                    f"{film.label}: {words} the clicked angle turns at {slope:.3g} rad/s, the fitted flight at "
+                    f"{meant:.3g}: click the frames from {t[which][0]:.3f} to {t[which][-1]:.3f} s again"
+                )
+            if which is late and sign * slope > abs(omega0) * 1.05 + 6 * spread and sign * meant < abs(omega0):
+                raise UnsoundError(
+                    f"{film.label}: the bottle turns faster late ({slope:.3g} rad/s) than at its release "
+                    f"({omega0:.3g} rad/s): click the frames around {estimate.best['release']:.3f} s again"
+                )
 
     def lines(self) -> list[str]:
         """Return the estimate in lines for a terminal."""

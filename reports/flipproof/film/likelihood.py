@@ -115,6 +115,7 @@ class Held:
     Parameters
     ----------
     release, touch : float or None - [s] by the film's clock
+    table : float or None - y of the table in the picture [m]: the touch is when an end comes down to it
     tilt : bool - the picture's vertical is true
     scale : bool - gravity in the picture is 9.81 m/s^2
     noise : float or None - standard deviation of one coordinate
@@ -122,6 +123,7 @@ class Held:
 
     release: float | None = None
     touch: float | None = None
+    table: float | None = None
     tilt: bool = False
     scale: bool = False
     noise: float | None = None
