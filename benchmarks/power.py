@@ -39,6 +39,7 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
     "eighth": patches("eighth"),
     "ninth": patches("ninth"),
     "tenth": patches("tenth"),
+    "eleventh": patches("eleventh"),
     "right": dict(RIGHT),
 }
 """Mistakes by list and name, and solvers without one."""
@@ -51,6 +52,7 @@ MISSED: Final = (
     "reduced_free_slow_spin_not_scaled", "guard_against_endless_bounces", "straight_line_across_the_step",
     "angle_in_single_precision", "nearly_full_is_ice", "adaptive_strongest_support",
     "closed_form_flies_back_for_the_wrong_time", "capped_no_slice_below_a_millimetre",
+    "adams_stale_slope_after_impact", "heun3_rebound_of_the_late_speed", "slices_at_least_a_millimetre",
 )  # fmt: skip
 """Mistakes known to be missed."""
 

@@ -23,7 +23,7 @@ from scipy.optimize import minimize
 from flipproof.film.curves import SLICES, STEP, Curve, Equation
 from flipproof.film.hand import MOTIONS, REACH
 from flipproof.film.kernel.scoring import turnings
-from flipproof.film.likelihood import GRAVITY, HAND, TOUCH, Film, Fit, Held, Likelihood
+from flipproof.film.likelihood import FIRST, GRAVITY, LAST, SEARCH, TOUCH, Film, Fit, Held, Likelihood
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -208,7 +208,7 @@ def _estimated(
     equation = Equation(solver, sliced, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
     likelihood, x = starts[0][1:] if len(starts) == 1 else _chosen(starts, equation)
     if likelihood.two:
-        likelihood = likelihood.but(film=film, count=MOTIONS)
+        likelihood = likelihood.but(film=film, count=MOTIONS, rest=SEARCH)
         x = np.insert(x, -2, np.zeros(3 * (MOTIONS - 1)))
     likelihood, grid, complete = _closed_in(likelihood, equation, x, seconds)
     if not np.isfinite(grid.masses).any():
@@ -333,6 +333,7 @@ def _closed_in(
         high = np.minimum(high, nodes[matters].max(axis=0) + pad)
         if np.prod((high - low) / wide) > 0.4:
             shape = FINE
+            likelihood = likelihood.but(rest=LAST)
     return likelihood, Grid(nodes, np.broadcast_to(cell, nodes.shape), curves, fits), shape == FINE
 
 
@@ -442,14 +443,17 @@ def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
     picked = rng.choice(len(fits), DRAWS, p=chance / chance.sum())
     place = grid.nodes[picked] + (rng.random((DRAWS, 2)) - 0.5) * grid.cells[picked]
     inner = np.empty((DRAWS, len(fits[0].x)))
+    at = likelihood.index["log_noise"]
     for k in np.unique(picked):
-        mine = picked == k
-        root = np.linalg.cholesky(np.linalg.inv(fits[k].hessian))
-        moved = rng.standard_normal((int(mine.sum()), len(root))) @ root.T
-        # All deviations grow with the noise, which is a draw, too.
-        at = likelihood.index["log_noise"]
-        wider = np.exp(moved[:, at : at + 1])
-        inner[mine] = fits[k].x + np.where(np.arange(len(root)) == at, moved, moved * wider)
+        share = np.exp([mode.evidence - fits[k].evidence for mode in fits[k].modes])
+        kinds = np.where(picked == k, rng.choice(len(share), DRAWS, p=share / share.sum()), -1)
+        for kind, mode in enumerate(fits[k].modes):
+            mine = kinds == kind
+            root = np.linalg.cholesky(np.linalg.inv(mode.hessian))
+            moved = rng.standard_normal((int(mine.sum()), len(root))) @ root.T
+            # All deviations grow with the noise, which is a draw, too.
+            wider = np.exp(moved[:, at : at + 1])
+            inner[mine] = mode.x + np.where(np.arange(len(root)) == at, moved, moved * wider)
     parameters = dict(zip(likelihood.names, inner.T, strict=True))
     draws = {
         "gamma": SCALE * np.sinh(np.maximum(place[:, 0], 0.0)) * np.abs(parameters["omega0"]),
@@ -584,7 +588,7 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
         begins.sort(key=lambda guess: guess[0])
         for _, begin, x in begins[:3]:
             earthly = begin.but()
-            earthly.expected[8], earthly.stiffness[8] = -GRAVITY, 0.5**-2
+            earthly.expected[8], earthly.stiffness[:, 8] = -GRAVITY, 0.5**-2
             x = earthly.fitted(curve, x, 8).x
             better = _better(settle(begin, curve, x), curve, x)
             if better[2][8] < 0.0:  # what accelerates upwards is no flight
@@ -637,7 +641,7 @@ def _placed(film: Film, curve: Curve, spin: FloatArray, end: float, length: floa
     """Return all inner parameters for a given spin, the place by a robust linear fit up to ``end``, and the noise."""
     inside = (film.t >= spin[0] - 1e-9) & (film.t <= end + 1e-9)
     part = replace(film, t=film.t[inside], values=film.values[:, inside], lines=film.lines[inside])
-    x = np.array([*spin, *[0.0] * 5, -9.81, length, 0.0, 0.0, 0.0, np.log(0.002), np.log(HAND[0])])
+    x = np.array([*spin, *[0.0] * 5, -9.81, length, 0.0, 0.0, 0.0, np.log(0.002), np.log(FIRST.size)])
     likelihood = Likelihood(part, Held(), end, 0.002)
     values, slopes = likelihood.model(curve, x)
     seen = np.repeat(part.clicked[:, :, None], 2, axis=2).ravel()

@@ -1,10 +1,11 @@
 """What a hand does to place and angle before the release.
 
 Beyond the flight, which goes on backwards, a hand accelerates C_M in two directions, and theta, by a random process:
-Matern's of order 3/2, which changes within CHANGES, as hands do. Its value at the release has a prior of its own
-(Student's), for most hands let go when they push no more, and some while they push hardest: a process of one size all
-along takes the end of a gentle push for flight, and the release comes out early. Given that value, the rest is the sum
-of the process's largest principal components. All are integrated twice, between knots exactly.
+Matern's of order 3/2, which changes within CHANGES, as hands do. Its value at the release has a prior of its own, for
+some hands let go when they push no more, and some while they push hardest. One prior for both puts the release early:
+if it is wide, the end of a gentle push is taken for flight; if narrow, the end of a hard one. So both kinds are fitted,
+and weighed by their evidence. Given that value, the rest is the sum of the process's largest principal components. All
+are integrated twice, between knots exactly.
 """
 
 from __future__ import annotations
@@ -34,10 +35,8 @@ First guesses have a steady acceleration alone: a hand that may do anything coul
 PULL: Final = (60.0, 60.0, 300.0)
 """Standard deviations of a hand's accelerations less those of flight: of C_M [m/s^2], twice, and of theta [rad/s^2]."""
 
-JUMP: Final = 0.15
-"""Scale of their values at the release, in those units: of Student's distribution with ``FREEDOM`` degrees."""
-
-FREEDOM: Final = 3.0
+KINDS: Final = ((3.0, 5.0, 15.0), (30.0, 30.0, 150.0))
+"""Standard deviations of their values at the release, for the two kinds of hands, each as likely as the other."""
 
 LIFT: Final = (0.0, 9.81, 0.0)
 """Values at the release of a hand that does nothing but carry the bottle."""

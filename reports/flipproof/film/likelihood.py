@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.film.curves import Curve
-from flipproof.film.hand import APART, FREEDOM, JUMP, LIFT, PULL, motions
+from flipproof.film.hand import APART, KINDS, LIFT, PULL, motions
 from flipproof.film.kernel.scoring import ended, points, sums, variances
 from slicemodel.trajectory import FloatArray
 
@@ -35,12 +35,32 @@ GRAVITY: Final = 9.81
 BAD: Final = 0.01
 """Share of clicks that may lie anywhere."""
 
-FEWEST: Final = 3
-MOST: Final = 6
-"""Powers of time by which a hand is unknown, beyond a steady acceleration and beyond its motions."""
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What a hand does beyond its motions (``kernel.scoring.variances``).
 
-HAND: Final = (25.0, 0.5)
-"""Size of what a hand does beyond its motions (``kernel.scoring.variances``), and the deviation of its logarithm."""
+    Parameters
+    ----------
+    power : int - of time, by which it grows
+    size, deviation : float - its expected size [m/s^2], and the deviation of the logarithm
+    least : float - what is added to it: no hand is as steady as a flight [m/s^2]
+    """
+
+    power: int
+    size: float
+    deviation: float
+    least: float
+
+
+FIRST: Final = Rest(3, 25.0, 0.5, 2.5)
+SEARCH: Final = Rest(6, 25.0, 0.5, 2.5)
+LAST: Final = Rest(6, 1.0, 0.5, 0.1)
+"""Beyond a steady acceleration, in first guesses; beyond all motions, in the search for gamma and e; and after it.
+
+After the search it must stay below the noise where motions describe the hand: a variance that falls towards the
+release makes an early release likely, whatever is clicked. Before, while gamma and e may be wrong, it keeps a hand
+that may do anything from flying the bottle.
+"""
 
 TIGHT: Final = 1e-6
 """Standard deviation of what is held."""
@@ -53,6 +73,9 @@ Quantity = Literal["points", "theta", "omega"]
 PLACED: Final = ("release", "theta0", "omega0", "x0", "y0", "vx", "vy", "ax", "ay", "length")
 SPIN: Final = ("release", "theta0", "omega0", "log_noise")
 """Inner parameters of points and of a table of theta or omega; gamma / |omega_0| and e are the outer ones."""
+
+RELEASED: Final = slice(len(PLACED), len(PLACED) + 3)
+"""Which of them are the hand's accelerations at the release."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,35 +153,61 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
-    """Inner parameters at the largest posterior density for one curve; ``x`` (K,), ``hessian`` (K, K)."""
+class Mode:
+    """Where the posterior density is largest for one curve and one kind of hand.
+
+    Parameters
+    ----------
+    x, hessian : (K,) and (K, K) - inner parameters, and minus the second derivatives of the density's logarithm
+    cost, evidence : float - minus that logarithm, and the logarithm of its integral by Laplace
+    """
 
     x: FloatArray
     cost: float
     hessian: FloatArray
-    log_noise: float
-    degrees: int
+    evidence: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """What one curve allows: a mode for every kind of hand, the likeliest first."""
+
+    modes: tuple[Mode, ...]
+
+    @property
+    def x(self) -> FloatArray:
+        """Inner parameters of the likeliest mode, (K,)."""
+        return self.modes[0].x
+
+    @property
+    def cost(self) -> float:
+        """Cost of the likeliest mode."""
+        return self.modes[0].cost
 
     @property
     def evidence(self) -> float:
-        """Logarithm of the integral over the inner parameters, by Laplace."""
-        _, size = np.linalg.slogdet(self.hessian)
-        cost = self.cost + self.degrees * self.log_noise
-        return float(-cost - 0.5 * size + 0.5 * len(self.x) * np.log(2 * np.pi))
+        """Logarithm of the integral over the inner parameters and the kinds of hands."""
+        return float(np.logaddexp.reduce([mode.evidence for mode in self.modes]) - np.log(len(self.modes)))
 
 
 class Likelihood:
     """Minus the logarithm of the density of a film's values and of the weak priors, as a function of ``names``."""
 
     def __init__(
-        self, film: Film, held: Held, touch: float, noise: float, speed: float = TOUCH[1], count: int = 1
+        self,
+        film: Film,
+        held: Held,
+        touch: float,
+        noise: float,
+        speed: float = TOUCH[1],
+        count: int = 1,
+        rest: Rest = FIRST,
     ) -> None:
-        """Take the touch, a guess of the noise, the velocity that the table takes, and the hand's number of motions."""
-        self.film, self.held, self.touch, self.noise, self.speed = film, held, touch, noise, speed
+        """Take the touch, a guess of the noise, the velocity that the table takes, the hand's motions and their rest."""
+        self.film, self.held, self.touch, self.noise, self.speed, self.rest = film, held, touch, noise, speed, rest
         self.area, self.seen = film.area, film.clicked
         self.two = film.values.shape[2] == 2
         self.count, self.names, self.hands = count, film.names(count), motions(count)
-        self.power = FEWEST if count == 1 else MOST
         self.index = {name: k for k, name in enumerate(self.names)}
         self.log_bad = float(np.log(BAD / self.area))
         self.expected, self.stiffness = self._priors()
@@ -167,22 +216,22 @@ class Likelihood:
         self.degrees = (13 if self.two else 3) - sum(fixed)
 
     def but(self, **changed: Any) -> Likelihood:
-        """Return the same with another film, touch, speed or number of motions."""
-        known = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "speed", "count")}
+        """Return the same with another film, touch, speed, number of motions or rest."""
+        known = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "speed", "count", "rest")}
         return Likelihood(**known | changed)
 
     def _priors(self) -> tuple[FloatArray, FloatArray]:
-        """Return what priors expect, and their inverse variances, 0 where there is none; each (K,)."""
+        """Return what priors expect (K,), and for every kind of hand their inverse variances, 0 where there is none."""
         held, noise = self.held, self.noise if self.held.noise is None else self.held.noise
         priors = {"log_noise": (float(np.log(noise)), 3.0 if held.noise is None else TIGHT)}
         if held.release is not None:
             priors["release"] = held.release, TIGHT
         if self.two:
-            priors["log_hand"] = float(np.log(HAND[0])), HAND[1]
+            priors["log_hand"] = float(np.log(self.rest.size)), self.rest.deviation
             hand = [name for name in self.names if name.startswith("hand_")]
             priors |= {name: (0.0, size) for name, size in zip(hand, PULL * self.count, strict=True)}
             if self.count > 1:
-                priors |= {name: (lift, JUMP * size) for name, lift, size in zip(hand, LIFT, PULL, strict=False)}
+                priors |= {name: (lift, 1.0) for name, lift in zip(hand, LIFT, strict=False)}
             if held.tilt:
                 priors["ax"] = 0.0, TIGHT
         elif self.film.quantity == "omega":
@@ -190,7 +239,11 @@ class Likelihood:
         expected, stiffness = np.zeros(len(self.index)), np.zeros(len(self.index))
         for name, (value, deviation) in priors.items():
             expected[self.index[name]], stiffness[self.index[name]] = value, deviation**-2
-        return expected, stiffness
+        if self.count == 1:
+            return expected, stiffness[None]
+        kinds = np.tile(stiffness, (len(KINDS), 1))
+        kinds[:, RELEASED] = np.array(KINDS) ** -2
+        return expected, kinds
 
     # ------------------------------------------------------------------ the model
 
@@ -223,7 +276,8 @@ class Likelihood:
             slopes = np.zeros((len(t), len(x)))
             slopes[:, -1] = 2 * np.exp(2 * x[-1])
             return np.full(len(t), np.exp(2 * x[-1])), slopes
-        variance, slopes = variances(t, x, self.touch, self.speed, self.area / (2 * np.pi), self.power)
+        most, rest = self.area / (2 * np.pi), self.rest
+        variance, slopes = variances(t, x, self.touch, self.speed, most, rest.power, rest.least)
         return variance, slopes
 
     # ------------------------------------------------------------------ densities
@@ -238,7 +292,7 @@ class Likelihood:
         """Return the cost of all clicks had the touch been at each of some times, shape (len(times),)."""
         values, _ = self.model(curve, x)
         t, most = self.film.t, self.area / (2 * np.pi)
-        variance, _ = variances(t, x, np.inf, 0.0, most, self.power)
+        variance, _ = variances(t, x, np.inf, 0.0, most, self.rest.power, self.rest.least)
         squares = (np.where(self.seen[:, :, None], self.film.values - values, 0.0) ** 2).sum(axis=2)
         return np.asarray(ended(squares, self.seen, variance, t, times, speed, most, np.log1p(-BAD), self.log_bad))
 
@@ -250,28 +304,21 @@ class Likelihood:
         both = np.logaddexp(good, self.log_bad)
         return np.where(self.seen, -both, 0.0), np.where(self.seen, np.exp(good - both), 0.0), missed
 
-    def terms(self, curve: Curve, x: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Return the cost, its gradient and Fisher's information."""
+    def terms(self, curve: Curve, x: FloatArray, kind: int = 0) -> tuple[float, FloatArray, FloatArray]:
+        """Return the cost for a kind of hand, its gradient and Fisher's information."""
         values, slopes = self.model(curve, x)
         variance, dv = self.variance(x)
         missed = self.film.values - values
         cost, gradient, information = sums(missed, self.seen, slopes, variance, dv, np.log1p(-BAD), self.log_bad)
-        return cost + self._add_priors(x, gradient, information), gradient, information
+        return cost + self._add_priors(x, self.stiffness[kind], gradient, information), gradient, information
 
-    def _add_priors(self, x: FloatArray, gradient: FloatArray, information: FloatArray) -> float:
+    def _add_priors(self, x: FloatArray, stiffness: FloatArray, gradient: FloatArray, information: FloatArray) -> float:
         """Add what is held, and weak priors that keep parameters in reach, to both; return their cost."""
         away = x - self.expected
-        pull = self.stiffness * away
+        pull = stiffness * away
         gradient += pull
-        information.flat[:: len(x) + 1] += self.stiffness
+        information.flat[:: len(x) + 1] += stiffness
         cost = 0.5 * float(away @ pull)
-        if self.count > 1:  # Student's where the normal one was added
-            values = slice(10, 13)
-            far = pull[values] * away[values] / FREEDOM
-            less = (1.0 + 1.0 / FREEDOM) / (1.0 + far) - 1.0
-            cost += 0.5 * float(((FREEDOM + 1.0) * np.log1p(far) - FREEDOM * far).sum())
-            gradient[values] += less * pull[values]
-            information[range(10, 13), range(10, 13)] += less * self.stiffness[values]
         if self.two and self.held.scale:
             down = float(np.hypot(x[7], x[8]))
             row = x[7:9] / (down * TIGHT)
@@ -284,8 +331,12 @@ class Likelihood:
         return float(cost - self.degrees * x[at])
 
     def fitted(self, curve: Curve, x: FloatArray, steps: int = 30) -> Fit:
-        """Return the inner parameters of the least cost near ``x``, by scoring with Levenberg's damping."""
-        cost, gradient, hessian = self.terms(curve, x)
+        """Return the modes near ``x``, by scoring with Levenberg's damping."""
+        modes = [self._mode(curve, x, steps, kind) for kind in range(len(self.stiffness))]
+        return Fit(tuple(sorted(modes, key=lambda mode: -mode.evidence)))
+
+    def _mode(self, curve: Curve, x: FloatArray, steps: int, kind: int) -> Mode:
+        cost, gradient, hessian = self.terms(curve, x, kind)
         damping = 1e-6
         for _ in range(steps):
             damped = hessian.copy()
@@ -293,7 +344,7 @@ class Likelihood:
             step = -np.linalg.solve(damped, gradient)
             trial = x + step
             sound = trial[2] * x[2] > 0 and abs(step[self.index["log_noise"]]) < 5
-            new = self.terms(curve, trial) if sound else None
+            new = self.terms(curve, trial, kind) if sound else None
             if new is None or not new[0] <= cost:
                 damping *= 10
                 if damping > 1e6:
@@ -303,4 +354,8 @@ class Likelihood:
             x, (cost, gradient, hessian), damping = trial, new, max(damping / 5, 1e-9)
             if gain < 1e-3:
                 break
-        return Fit(x, cost, hessian, float(x[self.index["log_noise"]]), self.degrees)
+        _, size = np.linalg.slogdet(hessian)
+        evidence = -cost - self.degrees * x[self.index["log_noise"]] - 0.5 * size + 0.5 * len(x) * np.log(2 * np.pi)
+        if self.count > 1:  # priors that differ by kind, with their norm
+            evidence += 0.5 * np.log(self.stiffness[kind, RELEASED]).sum()
+        return Mode(x, cost, hessian, float(evidence))

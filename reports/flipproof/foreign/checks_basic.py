@@ -143,6 +143,7 @@ def check_inputs(traits: Traits) -> Making:
     ask = replace(ask_of(traits, THROW, -2), start=SPREAD)
     others = {words: replace(ask_of(traits, throw, -2), start=SPREAD) for words, throw in throws.items()}
     others["another start"] = replace(ask, start=stack)
+    others["another start of the same mean"] = replace(ask, start=np.array([0.8, 0.7, 0.4, 0.2]) * bottle.length)
     others["other times"] = replace(ask, times=ask.times**2 / ask.times[-1])
     # The first throw comes again before each: whatever is kept of the last throw alone is kept of that one.
     asks = [question for other in others.values() for question in (ask, other)]

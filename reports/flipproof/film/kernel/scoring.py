@@ -14,9 +14,6 @@ from slicemodel.compiled import inner, kept_on_disk
 QUICK = 0.05
 """Time by which the powers of time before the release are scaled [s]."""
 
-STEADY = 2.5
-"""Least size of what a hand does beyond its motions [m/s^2]: no hand is as steady as a flight."""
-
 
 @kept_on_disk()
 def curve_at(rows, slopes, step, moved, s):
@@ -100,16 +97,16 @@ def points(turning, t, x, hands, apart):
 
 
 @kept_on_disk()
-def variances(t, x, touch, speed, most, power):
+def variances(t, x, touch, speed, most, power, steady):
     """Return the variance of one coordinate of a click (P,), and its slopes by the inner parameters (P, K).
 
-    A hand adds to it before the release, by a ``power`` of time, and a table that takes a velocity ``speed`` after the
-    touch; both level off at ``most``, beyond the picture.
+    A hand adds to it before the release, by a ``power`` of time and no less than ``steady`` [m/s^2], and a table that
+    takes a velocity ``speed`` after the touch; both level off at ``most``, beyond the picture.
     """
     variance, slopes = np.empty(len(t)), np.zeros((len(t), len(x)))
     at = len(x) - 2
     sigma, scale = math.exp(2 * x[at]), 1 / math.gamma(power + 1) / QUICK ** (power - 2)
-    hand = scale * (STEADY + math.exp(x[at + 1]))
+    hand = scale * (steady + math.exp(x[at + 1]))
     for i in range(len(t)):
         before = min(t[i] - x[0], 0.0)
         pulled = (hand * before**power) ** 2
