@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from flipproof.film.curves import SLICES, STEP, Curve, Equation
-from flipproof.film.hand import MOTIONS, REACH
+from flipproof.film.hand import FIRST, LAST, MOTIONS, REACH, SEARCH
 from flipproof.film.kernel.scoring import turnings
-from flipproof.film.likelihood import FIRST, GRAVITY, LAST, SEARCH, TOUCH, Film, Fit, Held, Likelihood
+from flipproof.film.likelihood import GRAVITY, TOUCH, Film, Fit, Held, Likelihood
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 

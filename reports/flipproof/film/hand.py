@@ -2,14 +2,15 @@
 
 Beyond the flight, which goes on backwards, a hand accelerates C_M in two directions, and theta, by a random process:
 Matern's of order 3/2, which changes within CHANGES, as hands do. Its value at the release has a prior of its own, for
-some hands let go when they push no more, and some while they push hardest. One prior for both puts the release early:
-if it is wide, the end of a gentle push is taken for flight; if narrow, the end of a hard one. So both kinds are fitted,
-and weighed by their evidence. Given that value, the rest is the sum of the process's largest principal components. All
-are integrated twice, between knots exactly.
+some hands let go when they push no more, and some while they push hardest: a process of one size all along takes the
+end of a gentle push for flight, and the release comes out early. Both kinds of hands are fitted, and weighed by their
+evidence. Given that value, the rest is the sum of the process's largest principal components. All are integrated twice,
+between knots exactly.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
@@ -40,6 +41,34 @@ KINDS: Final = ((3.0, 5.0, 15.0), (30.0, 30.0, 150.0))
 
 LIFT: Final = (0.0, 9.81, 0.0)
 """Values at the release of a hand that does nothing but carry the bottle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What a hand does beyond its motions (``kernel.scoring.variances``).
+
+    Parameters
+    ----------
+    power : int - of time, by which it grows
+    size, deviation : float - its expected size [m/s^2], and the deviation of the logarithm
+    least : float - what is added to it: no hand is as steady as a flight [m/s^2]
+    """
+
+    power: int
+    size: float
+    deviation: float
+    least: float
+
+
+FIRST: Final = Rest(3, 25.0, 0.5, 2.5)
+SEARCH: Final = Rest(6, 25.0, 0.5, 2.5)
+LAST: Final = Rest(6, 1.0, 0.5, 0.1)
+"""Beyond a steady acceleration, in first guesses; beyond all motions, in the search for gamma and e; and after it.
+
+After the search it must stay below the noise where motions describe the hand: a variance that falls towards the
+release makes an early release likely, whatever is clicked. Before, while gamma and e may be wrong, it keeps a hand
+that may do anything from flying the bottle.
+"""
 
 
 @cache

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.film.curves import Curve
-from flipproof.film.hand import APART, KINDS, LIFT, PULL, motions
+from flipproof.film.hand import APART, FIRST, KINDS, LIFT, PULL, Rest, motions
 from flipproof.film.kernel.scoring import ended, points, sums, variances
 from slicemodel.trajectory import FloatArray
 
@@ -34,33 +34,6 @@ GRAVITY: Final = 9.81
 
 BAD: Final = 0.01
 """Share of clicks that may lie anywhere."""
-
-@dataclass(frozen=True, slots=True)
-class Rest:
-    """What a hand does beyond its motions (``kernel.scoring.variances``).
-
-    Parameters
-    ----------
-    power : int - of time, by which it grows
-    size, deviation : float - its expected size [m/s^2], and the deviation of the logarithm
-    least : float - what is added to it: no hand is as steady as a flight [m/s^2]
-    """
-
-    power: int
-    size: float
-    deviation: float
-    least: float
-
-
-FIRST: Final = Rest(3, 25.0, 0.5, 2.5)
-SEARCH: Final = Rest(6, 25.0, 0.5, 2.5)
-LAST: Final = Rest(6, 1.0, 0.5, 0.1)
-"""Beyond a steady acceleration, in first guesses; beyond all motions, in the search for gamma and e; and after it.
-
-After the search it must stay below the noise where motions describe the hand: a variance that falls towards the
-release makes an early release likely, whatever is clicked. Before, while gamma and e may be wrong, it keeps a hand
-that may do anything from flying the bottle.
-"""
 
 TIGHT: Final = 1e-6
 """Standard deviation of what is held."""
@@ -203,7 +176,7 @@ class Likelihood:
         count: int = 1,
         rest: Rest = FIRST,
     ) -> None:
-        """Take the touch, a guess of the noise, the velocity that the table takes, the hand's motions and their rest."""
+        """Take the touch, a guess of the noise, the velocity the table takes, the hand's motions and their rest."""
         self.film, self.held, self.touch, self.noise, self.speed, self.rest = film, held, touch, noise, speed, rest
         self.area, self.seen = film.area, film.clicked
         self.two = film.values.shape[2] == 2

@@ -603,6 +603,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
     ("mistake", "check", "advice"),
     [
         ("answers_cached_without_start", "inputs", "keep no answer under a part of the question"),
+        ("remembered_by_the_mean_of_the_start", "inputs", "with another start of the same mean"),
         ("closed_form_momentum_remembered", "start", "compute J_0 from ask.start"),
         ("at_most_two_hundred_steps", "times", "right where outputs lie close: look at what goes on between two"),
         ("rest_from_a_fiftieth", "refinement", "right through impacts as long as no slice rests: look at rests"),
@@ -622,7 +623,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
     ],
 )
 def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    lists = ("first", "second", "fifth", "seventh", "eighth", "ninth")
+    lists = ("first", "second", "fifth", "seventh", "eighth", "ninth", "eleventh")
     solver = next(each[mistake] for each in map(patches, lists) if mistake in each).solver()
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
