@@ -203,8 +203,6 @@ class Likelihood:
             priors["log_hand"] = float(np.log(self.rest.size)), self.rest.deviation
             hand = [name for name in self.names if name.startswith("hand_")]
             priors |= {name: (0.0, size) for name, size in zip(hand, PULL * self.count, strict=True)}
-            if self.count > 1:
-                priors |= {name: (lift, 1.0) for name, lift in zip(hand, LIFT, strict=False)}
             if held.tilt:
                 priors["ax"] = 0.0, TIGHT
         elif self.film.quantity == "omega":
@@ -214,6 +212,7 @@ class Likelihood:
             expected[self.index[name]], stiffness[self.index[name]] = value, deviation**-2
         if self.count == 1:
             return expected, stiffness[None]
+        expected[RELEASED] = LIFT
         kinds = np.tile(stiffness, (len(KINDS), 1))
         kinds[:, RELEASED] = np.array(KINDS) ** -2
         return expected, kinds

@@ -130,7 +130,7 @@ def test_the_last_moments_of_a_hand_are_not_taken_for_flight(quick):
 def test_what_the_motions_of_a_hand_describe_is_not_left_to_the_variance(quick):
     """A variance that falls towards the release makes an early release likely, whatever is clicked.
 
-    It once was 60 times that of a click, and the release of our films 0.4 deviations early.
+    It once was 15 times that of a click in this film, and the release of our films 0.4 deviations early.
     """
     one = quick[1].estimate
     held = one.film.t > one.fit.x[0] - 0.12
