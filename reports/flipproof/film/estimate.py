@@ -562,11 +562,16 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
     frames = np.flatnonzero(~np.isnan(theta))
     if len(frames) < 8:
         raise NoFlightError(f"{film.label}: cap and base were clicked together in {len(frames)} frames; 8 are needed")
+    length = float(np.nanmedian(np.hypot(*(film.values[1] - film.values[0]).T)))
+    if not 0.05 < length / throw.bottle.length < 5.0:
+        raise NoFlightError(
+            f"{film.label}: cap and base lie {length:.3g} m apart, on a bottle of {throw.bottle.length:g} m: name the "
+            "unit of lengths, or give the bottle"
+        )
     step = float(np.median(np.diff(t)))
     equation = Equation("free-flight", throw, 30.0)
     pairs = np.array(list(product((0.02, 0.07, 0.2, 0.5, 1.2), (0.2, 0.5, 0.8))))
     every = [curve for curve in equation.curves(pairs, 20.0, 0.0) if curve]
-    length = float(np.nanmedian(np.hypot(*(film.values[1] - film.values[0]).T)))
     angle, times = theta[frames], t[frames]
     first = np.arange(len(frames)) if held.release is None else np.flatnonzero(times >= held.release - 1e-9)
     first = first[:: max(1, len(first) // 80)]

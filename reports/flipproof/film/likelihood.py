@@ -47,6 +47,12 @@ PLACED: Final = ("release", "theta0", "omega0", "x0", "y0", "vx", "vy", "ax", "a
 SPIN: Final = ("release", "theta0", "omega0", "log_noise")
 """Inner parameters of points and of a table of theta or omega; gamma / |omega_0| and e are the outer ones."""
 
+LOOSE: Final = np.array([1.0, 3.0, 30.0, 3.0, 3.0, 10.0, 10.0, 10.0, 10.0, 1.0])
+"""What is known of ``PLACED`` without any click, as deviations; SI units.
+
+Where every click is taken for a bad one nothing else limits the integral of the posterior density.
+"""
+
 RELEASED: Final = slice(len(PLACED), len(PLACED) + 3)
 """Which of them are the hand's accelerations at the release."""
 
@@ -326,7 +332,9 @@ class Likelihood:
             x, (cost, gradient, hessian), damping = trial, new, max(damping / 5, 1e-9)
             if gain < 1e-3:
                 break
-        _, size = np.linalg.slogdet(hessian)
+        loose = np.zeros(len(x))
+        loose[: 10 if self.two else 3] = LOOSE[: 10 if self.two else 3] ** -2.0
+        _, size = np.linalg.slogdet(hessian + np.diag(loose))
         evidence = -cost - self.degrees * x[self.index["log_noise"]] - 0.5 * size + 0.5 * len(x) * np.log(2 * np.pi)
         if self.count > 1:  # priors that differ by kind, with their norm
             evidence += 0.5 * np.log(self.stiffness[kind, RELEASED]).sum()

@@ -307,6 +307,22 @@ def test_an_angle_whose_slope_contradicts_the_fit_is_refused(bottles, changed, w
         one.check()
 
 
+def test_a_flight_that_no_click_supports_is_not_likely(quick):
+    """The integral over its parameters is bounded by what is known without a click: it was 3000 nats of nothing."""
+    estimate_ = quick[1].estimate
+    likelihood, curve = estimate_.likelihood, estimate_.curve
+    away = estimate_.fit.x.copy()
+    away[likelihood.index["x0"]] += 100.0  # every click is a bad one
+    lost = likelihood.fitted(curve, away, steps=0)
+    assert lost.evidence < estimate_.fit.evidence - 100.0
+
+
+def test_lengths_in_another_unit_are_refused():
+    film = film_of(clip(7, fps=60))
+    with pytest.raises(NoFlightError, match="cap and base lie 28 m apart"):
+        estimate(replace(film, values=100 * film.values), THROW)
+
+
 def test_a_grid_without_any_likelihood_is_refused(monkeypatch):
     monkeypatch.setattr("flipproof.film.estimate.Grid.masses", property(lambda grid: np.full(len(grid.nodes), -np.inf)))
     with pytest.raises(NoFlightError, match="no flight fits the clicks"):
