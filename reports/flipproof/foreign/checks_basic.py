@@ -361,8 +361,12 @@ def _of_decimals(answer: Answer) -> str:
 
 
 def check_velocity(traits: Traits) -> Making:
-    """v is the rate at which r changes."""
-    answers = yield [ask_of(traits, SMOOTH, level, 961) for level in ((0, 2) if traits.refined_by else (0,))]
+    """v is the rate at which r changes, whatever other times are asked."""
+    often = [ask_of(traits, SMOOTH, level, 961) for level in ((0, 2) if traits.refined_by else (0,))]
+    seldom = np.array([0, 240, 400, 800, 960])
+    times = often[0].times[seldom]
+    times.setflags(write=False)
+    *answers, few = yield [*often, replace(often[0], times=times)]
     if answers[0].r is None or answers[0].v is None:
         raise NotApplicableError("no v is given")
     sizes, step = [], float(answers[0].t[1])
@@ -373,6 +377,18 @@ def check_velocity(traits: Traits) -> Making:
         sizes.append(float(np.quantile(off, 0.9) / max(float(np.max(np.abs(a.v))), 1e-300)))
     fastest = max(float(np.max(np.abs(answers[0].v))), 1e-6)
     bound = (1e-4 if traits.refined_by else 1e-2) + 4 * traits.epsilon * THROW.bottle.length / (step * fastest)
+    assert few.r is not None
+    assert few.v is not None
+    moved = float(np.max(np.abs(few.r - answers[0].r[seldom])) / max(float(np.ptp(answers[0].r, axis=0).max()), 1e-300))
+    apart = float(np.max(np.abs(few.v - answers[0].v[seldom]))) / fastest
+    if apart > 100 * max(bound, moved):
+        return Found(
+            holds=False,
+            expected="the v of an instant, whatever other times are asked",
+            came=f"v changes by {apart:.2g} of its largest value and r by {moved:.2g} of its way",
+            where=f"0.05 s, asked at {len(times)} and at {len(answers[0].t)} times",
+            advice="v is the state's at each of ask.times, not a slope of r from one of them to the next",
+        )
     return Found(
         holds=sizes[0] <= bound or (_falls(sizes) and sizes[-1] < 1e-2),
         expected=f"v = dr/dt within {bound:.1g} of the largest v, or a difference that falls with refinement",

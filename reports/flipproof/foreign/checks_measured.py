@@ -272,11 +272,11 @@ def _singles(answer: Answer) -> list[str]:
 
 PIECES: Final = (
     elsewhere.WHOLE,
-    elsewhere.STICKY,
-    elsewhere.RESTLESS,
+    replace(elsewhere.STICKY, slices=5),
+    replace(elsewhere.RESTLESS, slices=5),
     replace(elsewhere.WHOLE, gravity=0.0, damping=0.0, angle=5.0),
 )
-"""Throws with and without weight, drag, impacts and rests on both ends."""
+"""Throws with and without weight, drag, and rests on both ends, of an even and an odd number of slices."""
 
 
 def check_piecewise(traits: Traits) -> Making:

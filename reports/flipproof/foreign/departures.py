@@ -80,6 +80,7 @@ SORTS: Final[Mapping[str, Sort]] = {
     "where there is drag": (lambda i: i.throw.drag > 0, "drag"),
     "where g = 0": (lambda i: i.throw.gravity == 0, "weight"),
     "where there is no drag": (lambda i: i.throw.drag == 0, "drag"),
+    "of an odd number of slices": (lambda i: i.throw.n_slices % 2 == 1, "odd"),
     "in which slices rest while there is drag": (lambda i: i.throw.drag > 0 and any(map(i.rests, ENDS)), "rests"),
     **_of_end(BASE),
     **_of_end(CAP),
@@ -95,6 +96,7 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "order of impacts in a step": "several impacts close together: each at its own time, the earliest first",
     "weight": "the weight",
     "drag": "the drag, and against what v is measured",
+    "odd": "every slice moves, also the last of an odd number",
     "impacts on rests": "the part of slices at rest in the impact of another",
 }
 """By what goes on between two outputs, what to look at."""

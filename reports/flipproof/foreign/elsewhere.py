@@ -194,6 +194,31 @@ FULL: Final = replace(PAPER, mass=0.05, filling=1.0, damping=0.0, gravity=0.0, t
 Where the tube recoils, rounding decides whether a solver answers these hits together or in turn: neither is accused.
 """
 
+SMALL: Final = replace(
+    PAPER, mass=3e-4, length=0.012, radius=0.004, capacity=6e-4, filling=0.3, slices=9, start="permuted",
+    omega0=-40.0, gravity=2.0,
+)  # fmt: skip
+"""A bottle of 12 mm with slices of 0.4 mm: a length, mass or drag coefficient that is cut off shows here."""
+
+SLOW: Final = replace(PAPER, slices=5, start="scattered", omega0=0.45, gravity=0.005, damping=0.05, angle=6.0)
+"""A bottle that turns once in 14 s: a spin, an acceleration or a duration that is cut off shows here."""
+
+SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
+    {
+        SMALL: (
+            replace(SMALL, mass=2.4, length=0.24, radius=0.08, capacity=4.8, gravity=40.0),
+            "right in a bottle of 0.24 m, wrong in one of 12 mm that moves in proportion",
+            "m, kg, kg/s or m/s, such as a least height, room, mass, drag or speed",
+        ),
+        SLOW: (
+            replace(SLOW, omega0=18.0, gravity=8.0, damping=2.0),
+            "right at 18 rad/s, wrong at 0.45 rad/s where everything moves in proportion",
+            "rad/s, m/s, m/s^2, 1/s or s, such as a least spin, speed, weight, drag or a longest flight",
+        ),
+    }
+)
+"""The same flights on other scales: if they are right, what is wrong, and the units of a constant that does it."""
+
 COUNT: Final = 16
 """Throws of a seed: eight of nine pairs of levels of two factors occur together in one of them, all levels do."""
 
@@ -515,7 +540,7 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
     if not place.on_lattice or place.equation != name_of(switches_of(equation)):
         raise NotApplicableError("needs an equation that the solver is found to solve")
     unrefined = min(0.01 + 4 * place.distance, 0.018)  # as far off as where it was placed, and not blurred
-    throws = drawn(seed)
+    throws = (*drawn(seed), SMALL, SLOW)
     flights = list(zip(throws, (yield from judging(traits, throws, seed, equation, unrefined)), strict=True))
     # Where a solver of low order errs less than elsewhere by luck, it owes no more than elsewhere.
     usual = (
@@ -565,6 +590,12 @@ def bisected(
 ) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]:
     """Return the sentence that tells right from wrong by one knob, and what to look at."""
     how: Callable[[Sequence[Knobs]], Judging] = lambda all: judging(traits, all, seed, equation, unrefined)  # noqa: E731
+    if knobs in SIMILAR:
+        similar, words, units = SIMILAR[knobs]
+        (scaled,) = yield from how([similar])
+        if not scaled.wrong:
+            advice = f"the equation has no scale of its own: look for a constant in {units}"
+            return f"{words}: {_wrong_words(judged)}", advice
     lost, together = _wrong_words(judged), TOGETHER if knobs is FULL else ""
     names = [name for name in WORDS if getattr(knobs, name) != getattr(PAPER, name)]
     paper, ice = replace(PAPER, frozen=knobs.frozen), "in ice " if knobs.frozen else ""

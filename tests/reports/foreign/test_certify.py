@@ -611,9 +611,13 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("throw_read_to_four_digits", "start", "theta_0 has only 4 digits: read the throw"),
         ("six_decimals", "definitions", "inertia has 6 decimals, which are few digits"),
         ("whole_steps_only", "angle", "theta stands still between two of the times asked"),
+        ("lists_speeds_by_differences", "velocity", "not a slope of r from one of them to the next"),
+        ("lists_in_pairs", "piecewise", "of an odd number of slices, in none of"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
+                ("slices_at_least_a_millimetre", "elsewhere", "look for a constant in m, kg, kg/s"),
+                ("reduced_free_slow_spin_not_scaled", "elsewhere", "look for a constant in rad/s"),
                 ("only_what_moves_is_struck", "restitution", "look at e at the cap, and at the slices that rest"),
                 ("ice_gathers_speed", "elsewhere", "its v is 0 and stays 0"),
                 ("first_found_is_first", "elsewhere", "of several in a step the earliest"),
