@@ -164,7 +164,11 @@ class Judged:
                 "--minutes or fewer --slices"
             )
         if len(self.missed) < 8:
-            raise UnsoundError(f"{film.label}: {len(self.missed)} sound frames in flight; 8 are needed: click more")
+            clicked = int((estimate.flying & film.clicked.all(axis=0)).sum())
+            what = "click more" if clicked < 8 else "look for an origin or a stick that moves, or exchanged ends"
+            raise UnsoundError(
+                f"{film.label}: {len(self.missed)} of {clicked} frames clicked in flight fit it; 8 are needed: {what}"
+            )
         if estimate.likelihood.two:
             if held.release is None and x[0] < film.t[0] + 2 * float(np.median(np.diff(film.t))):
                 raise UnsoundError(
