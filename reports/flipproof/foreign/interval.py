@@ -93,7 +93,7 @@ def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Int
     throw, switches = ask.scenario, switches_of(equation)
     length, spin = throw.bottle.length, abs(throw.omega0)
     rest_speed = usual_rest_speed(switches.name)
-    scale = {"theta": 1.0, "omega": spin, "r": length, "v": length * spin}
+    scale = {"omega": spin, "r": length, "v": length * spin}
     assert answer.r is not None
     assert answer.v is not None
     intervals = []
@@ -114,6 +114,7 @@ def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Int
         due = {name: getattr(flight, name)[-1] for name in FIELDS}
         inertia = moment_of_inertia(throw, np.array([places, r[1]]))
         due["omega"] = answer.omega[k] * inertia[0] / inertia[1]
+        scale["theta"] = max(1.0, abs(float(answer.theta[k + 1])))  # digits are those of a number, not of a radian
         difference = {name: np.max(np.abs(getattr(answer, name)[k + 1] - due[name])) / scale[name] for name in FIELDS}
         intervals.append(
             Interval(
