@@ -31,7 +31,8 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool) -> str:
             return known
         if all(i.hits for i in intervals):
             return _of_impacts(intervals, recoil=recoil)
-        return _of_inertia(intervals) or _of_motion(intervals)
+        throws = _by_throw(intervals)  # a factor may depend on the mass of a slice
+        return _of_inertia(throws[0]) or next(filter(None, map(_of_motion, (intervals, *throws))), "")
     return ""
 
 
@@ -134,10 +135,8 @@ def _of_inertia(intervals: Sequence[Interval]) -> str:
     """Return which part of J is another than by definition: the factors of its parts with which J omega is constant."""
     if _worst(intervals)["omega"] < FLOOR:
         return ""
-    numbers = [i.number for i in intervals]
-    intervals = [i for i in intervals if i.number == max(set(numbers), key=numbers.count)]
     r, omega = (np.array([getattr(i, name)[1] for i in intervals]) for name in ("r", "omega"))
-    parts = _parts_of_inertia(intervals[0].throw, r)
+    parts = parts_of_inertia(intervals[0].throw, r)
     # The factors of the parts with which J omega is constant: they are known up to a common one.
     columns = np.array(list(parts.values())).T * omega[:, None]
     momentum = columns.sum(axis=1)
@@ -151,7 +150,13 @@ def _of_inertia(intervals: Sequence[Interval]) -> str:
     return f"omega goes with a J = {' + '.join(parts)} in which {counts}" if off else ""
 
 
-def _parts_of_inertia(throw: Scenario, r: FloatArray) -> dict[str, FloatArray]:
+def _by_throw(intervals: Sequence[Interval]) -> list[list[Interval]]:
+    """Return the intervals of each throw, those of the throw that has the most first."""
+    numbers = sorted({i.number for i in intervals})
+    return sorted(([i for i in intervals if i.number == number] for number in numbers), key=len, reverse=True)
+
+
+def parts_of_inertia(throw: Scenario, r: FloatArray) -> dict[str, FloatArray]:
     """Return the parts of J about the centre of mass, shape (K,) each, of places of shape (K, N)."""
     bottle, mean = throw.bottle, r.mean(axis=1)
     reduced = bottle.mass * throw.water_mass / throw.total_mass
@@ -164,7 +169,7 @@ def _parts_of_inertia(throw: Scenario, r: FloatArray) -> dict[str, FloatArray]:
 
 def _of_rate(intervals: Sequence[Interval]) -> str:
     """Return which part of J changes omega too much or too little, where it is a state: omega' = -omega J' / J."""
-    before, after = (_parts_of_inertia(intervals[0].throw, np.array([i.r[k] for i in intervals])) for k in (0, 1))
+    before, after = (parts_of_inertia(intervals[0].throw, np.array([i.r[k] for i in intervals])) for k in (0, 1))
     changes = {name: (after[name] - before[name]) / sum(after.values()) for name in list(after)[1:]}
     columns = np.array(list(changes.values())).T
     off = np.array([1.0 - i.omega[1] / i.due["omega"] for i in intervals])
@@ -227,7 +232,7 @@ def _of_motion(intervals: Sequence[Interval]) -> str:
             columns = np.array([table[name] for name in chosen]).T
             factors, *_ = np.linalg.lstsq(columns, target, rcond=1e-9)
             left = rms(columns @ factors - target) / size
-            if best is None or left < best[0]:
+            if best is None or left < best[0] - 1e-6:
                 best = left, chosen, factors
         if best is not None and best[0] < 0.03:
             parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from flipproof.foreign import elsewhere
+from flipproof.foreign.causes import parts_of_inertia
 from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift, when
-from flipproof.foreign.contract import Answer, Ask, Traits
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
+from flipproof.foreign.departures import departing
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass, moment_of_inertia
@@ -256,7 +259,8 @@ def check_ice(traits: Traits) -> Making:
         expected=f"{expected[worst]} within {bounds[worst]:.1g}",
         came=f"{worst} off by {off[worst].max():.2g}",
         where=f"scenario.frozen = True, {when(ask.times, off[worst])}",
-        advice=_of_ice(worst, wrapped, late=float(off["theta"][0]) <= bounds["theta"]),
+        advice=(_of_pace((answer.theta - THROW.theta0)[1:] / turned[1:]) if worst == "theta" and not wrapped else "")
+        or _of_ice(worst, wrapped, late=float(off["theta"][0]) <= bounds["theta"]),
         facts={"drift": float(off["omega"].max())},
     )
 
@@ -275,6 +279,14 @@ def _of_ice(worst: str, wrapped: bool, *, late: bool) -> str:
     )
 
 
+def _of_pace(pace: FloatArray) -> str:
+    """Return that theta advances by a constant share of omega t, if it does."""
+    off = float(np.median(pace)) - 1.0
+    if abs(off) < 1e-9 or float(np.ptp(pace)) > 1e-3 * abs(off):
+        return ""
+    return f"theta advances by {1.0 + off:.6g} omega dt in every step: look for weights that do not add up to 1"
+
+
 def check_angle(traits: Traits) -> Making:
     """theta is the integral of omega over time, also late in a long flight."""
     asks = _refined(traits, 961)
@@ -290,6 +302,8 @@ def check_angle(traits: Traits) -> Making:
     enough = 8.0 if (traits.order or 0.0) >= 2.0 and sizes[-1] > bound else 3.0
     holds = sizes[0] <= bound or (_falls(sizes, enough) and sizes[-1] <= 100 * bound)
     hint = "" if holds else _own_times(answers[0]) or _jump(asks[0].times, answers[0].omega / THROW.omega0)
+    if not (holds or hint):
+        hint = _lags(asks[0], answers[0])
     stops = holds and (slow > 100 * max(bound, sizes[0]) or late.theta[-1] == late.theta[-2])
     halts = _own_times(late) if stops and np.any(np.diff(late.theta[: np.argmax(late.theta)]) == 0.0) else ""
     return Found(
@@ -313,6 +327,13 @@ def _own_times(answer: Answer) -> str:
     if np.mean(bends) < 0.5 and np.ptp(answer.omega) > 0.01 * abs(THROW.omega0):
         return "theta runs straight from time to time of its own: go to ask.times themselves instead of interpolating; "
     return ""
+
+
+def _lags(ask: Ask, answer: Answer) -> str:
+    """Return that the omega answered is that of another instant, if it is not what the places answered make of it."""
+    if answer.r is None or float(_drift(ask, answer).max()) < 1e-5:
+        return ""
+    return "omega is not J_0 omega_0 / J of the places answered with it: answer the omega of the same instant; "
 
 
 def _jump(times: FloatArray, omega: FloatArray) -> str:
@@ -346,9 +367,23 @@ def check_definitions(traits: Traits) -> Making:
         came=f"{worst} off by {off[worst].max():.2g}",
         where=when(answer.t, off[worst]),
         advice=_of_decimals(answer)
+        + (_of_parts(answer) if worst == "inertia" else "")
         + "r_cm is the centre of mass of bottle and water from the cap, J that about it with the bottle's own: "
         "look at the masses, at the bottle's own inertia, and at where the answer is put together",
     )
+
+
+def _of_parts(answer: Answer) -> str:
+    """Return which part of J by its definition counts more or less than once in the inertia answered, if one does."""
+    assert answer.r is not None
+    assert answer.inertia is not None
+    parts = parts_of_inertia(THROW, answer.r)
+    columns = np.array(list(parts.values())).T
+    factors, *_ = np.linalg.lstsq(columns, answer.inertia, rcond=1e-12)
+    if np.max(np.abs(columns @ factors - answer.inertia)) > 1e-4 * np.max(answer.inertia):
+        return ""
+    off = [f"{name} counts {f:.3g} times" for name, f in zip(parts, factors, strict=True) if abs(f - 1.0) > 1e-3]
+    return f"in J = {' + '.join(parts)}, {' and '.join(off)}; " if off else ""
 
 
 def _of_decimals(answer: Answer) -> str:
@@ -583,6 +618,10 @@ def check_equation(traits: Traits) -> Making:
     own, hidden = place.change or 0.0, place.following_distance / 4
     weak = f"its own error, {own:.2g} of omega_0, is too large to tell equations apart" if own > hidden else ""
     advice = "" if holds and not strict else (yield from elsewhere.simplified(traits, declared))
+    if not (advice or place.on_lattice or place.still):
+        with suppress(ForeignError, NotApplicableError):
+            pieces, what = yield from departing(traits, declared, [ask_of(traits, throw) for throw in THROWS])
+            advice = pieces and f"there it departs {pieces}; {what and f'{what}; '}"
     advice = advice or (place.advice and f"{place.advice}; ")
     return Found(
         holds=holds and not strict,

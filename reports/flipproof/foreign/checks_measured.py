@@ -149,7 +149,34 @@ def check_order_before(traits: Traits) -> Making:
     # Few and long steps: at short ones an order of 4 and more drowns in round-off. Low orders show at short ones only.
     # The theory is of short ones: the best of the ratios counts.
     levels = range(-8, -2) if declared > 2 else range(-4, 0)
-    answers = yield [ask_of(traits, SMOOTH, level, points=3) for level in levels]
+    orders, largest = yield from _orders_before(traits, SMOOTH, levels)
+    if not orders:
+        raise NotApplicableError(f"changes under refinement are round-off, {largest:.2g} of omega_0")
+    worst = min(orders, key=lambda name: orders[name])
+    holds, advice = orders[worst] >= declared - ORDER_ROOM, ""
+    if not holds:
+        for name, throw in {"weight": replace(SMOOTH, gravity=0.0), "drag": replace(SMOOTH, drag=0.0)}.items():
+            without, _ = yield from _orders_before(traits, throw, levels)
+            if without and min(without.values()) >= declared - ORDER_ROOM:
+                advice = f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}"
+                break
+    alike = worst == "omega" or len(orders) == 1 or min(orders.values()) == max(orders.values())
+    where = f"{worst} is taken or answered" if not alike else "omega, r_CM or J are taken"
+    return Found(
+        holds=holds,
+        expected=f"order {declared:g} or more, within {ORDER_ROOM}",
+        came=f"{orders[worst]:.2f} ({worst})",
+        where=f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves",
+        advice=advice or f"a coefficient of the step, or the instant at which {where}, costs the order",
+        facts={"order_before_impacts": orders[worst], "orders": orders},
+    )
+
+
+def _orders_before(
+    traits: Traits, throw: Scenario, levels: Sequence[int]
+) -> Generator[Sequence[Ask], Sequence[Answer], tuple[dict[str, float], float]]:
+    """Return the observed order by field, none where changes are round-off, and the largest change of omega."""
+    answers = yield [ask_of(traits, throw, level, points=3) for level in levels]
     orders: dict[str, float] = {}
     floor = max(ROUNDOFF, 64 * traits.epsilon)
     for name in FIELDS:
@@ -159,20 +186,7 @@ def check_order_before(traits: Traits) -> Making:
         ratios = [math.log2(a / b) for a, b in pairwise(clear)]
         if ratios:
             orders[name] = max(ratios)
-    if not orders:
-        largest = max(shift(a, b, SMOOTH.omega0) for a, b in pairwise(answers))
-        raise NotApplicableError(f"changes under refinement are round-off, {largest:.2g} of omega_0")
-    worst = min(orders, key=lambda name: orders[name])
-    return Found(
-        holds=orders[worst] >= declared - ORDER_ROOM,
-        expected=f"order {declared:g} or more, within {ORDER_ROOM}",
-        came=f"{orders[worst]:.2f} ({worst})",
-        where=f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves",
-        advice="a coefficient of the step, or the instant at which omega, r_CM or J are taken, costs the order"
-        if worst == "omega" or len(orders) == 1 or min(orders.values()) == max(orders.values())
-        else f"a coefficient of the step, or the instant at which {worst} is taken or answered, costs the order",
-        facts={"order_before_impacts": orders[worst], "orders": orders},
-    )
+    return orders, max(shift(a, b, throw.omega0) for a, b in pairwise(answers))
 
 
 def check_order_across(traits: Traits) -> Making:

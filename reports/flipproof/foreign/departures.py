@@ -96,7 +96,7 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "order of impacts in a step": "several impacts close together: each at its own time, the earliest first",
     "weight": "the weight",
     "drag": "the drag, and against what v is measured",
-    "odd": "every slice moves, also the last of an odd number",
+    "odd": "the loop over slices: every slice moves, also the last of an odd number",
     "impacts on rests": "the part of slices at rest in the impact of another",
 }
 """By what goes on between two outputs, what to look at."""

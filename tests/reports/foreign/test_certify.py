@@ -611,11 +611,20 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("throw_read_to_four_digits", "start", "theta_0 has only 4 digits: read the throw"),
         ("six_decimals", "definitions", "inertia has 6 decimals, which are few digits"),
         ("whole_steps_only", "angle", "theta stands still between two of the times asked"),
+        ("cash_karp_digits_swapped", "ice", "look for weights that do not add up to 1"),
+        ("scalar_omega_of_the_last_step", "angle", "answer the omega of the same instant"),
+        ("kutta3_slices_with_an_inertia_of_their_own", "definitions", "M_b (R^2/2 + L^2/12) counts 1.25 times"),
+        (
+            "position_verlet_drag_of_the_old_speed",
+            "order-before-impacts",
+            "of that order without drag: look at the instant",
+        ),
         ("lists_speeds_by_differences", "velocity", "not a slope of r from one of them to the next"),
         ("lists_in_pairs", "piecewise", "of an odd number of slices, in none of"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
+                ("three_eighths_forgets_a_light_bottle", "equation", "in which M_b (R^2/2 + L^2/12) counts"),
                 ("slices_at_least_a_millimetre", "elsewhere", "look for a constant in m, kg, kg/s"),
                 ("reduced_free_slow_spin_not_scaled", "elsewhere", "look for a constant in rad/s"),
                 ("only_what_moves_is_struck", "restitution", "look at e at the cap, and at the slices that rest"),
@@ -627,7 +636,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
     ],
 )
 def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    lists = ("first", "second", "fifth", "seventh", "eighth", "ninth", "eleventh")
+    lists = ("first", "second", "fifth", "seventh", "eighth", "ninth", "eleventh", "twelfth")
     solver = next(each[mistake] for each in map(patches, lists) if mistake in each).solver()
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
