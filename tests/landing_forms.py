@@ -13,7 +13,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from slicemodel.scenario import Scenario
+import numpy as np
+
+from slicemodel import Scenario, Touch
+
+
+def at_rest(scenario: Scenario, tilt: float = 0.0, omega: float = 0.0, velocity=(0.0, 0.0), r=None) -> Touch:
+    """Return a touch of a bottle whose water does not move in it; it lies on the base, unless told otherwise."""
+    places = scenario.initial_positions() if r is None else r
+    still = np.zeros(scenario.n_slices)
+    return Touch(scenario=scenario, theta=tilt, omega=omega, velocity=velocity, r=places, v=still)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,17 +2,18 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 import rods_by_events
-from landing_forms import Block, corner_ratio, ends_upright
+from landing_forms import Block, at_rest, corner_ratio, ends_upright
 from scipy.integrate import quad
 
 import engine_check
 import ode_reference
 from ode_reference.landing.land import path, world_of
-from slicemodel import Bottle, Scenario, ScenarioError, Table, Touch, touch
+from slicemodel import Bottle, Scenario, ScenarioError, Table, touch
 from slicemodel.observables import static_toppling_angle
 
 G = 9.81
@@ -50,49 +51,7 @@ def critical_share(restitution_table, restitution_water):
     return restitution_table / ((1 + restitution_table) * (1 + restitution_water))
 
 
-def at_rest(scenario, tilt=0.0, omega=0.0, velocity=(0.0, 0.0), r=None, v=None):
-    n = scenario.n_slices
-    return Touch(
-        scenario=scenario,
-        theta=tilt,
-        omega=omega,
-        velocity=velocity,
-        r=scenario.initial_positions() if r is None else r,
-        v=np.zeros(n) if v is None else v,
-    )
-
-
-def block(scenario):
-    """M, J about C_M, z of C_M over the base, rho, I about a rim, with the water at rest on the base."""
-    bottle, m, r = scenario.bottle, scenario.slice_mass, scenario.initial_positions()
-    mass = scenario.total_mass
-    z = (bottle.mass * bottle.length / 2 + m * (bottle.length - r).sum()) / mass
-    own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12 + (bottle.length / 2 - z) ** 2)
-    inertia = own + m * ((bottle.length - r - z) ** 2).sum()
-    return mass, inertia, z, math.hypot(z, bottle.radius), inertia + mass * (z * z + bottle.radius**2)
-
-
 # ---------------------------------------------------------------------- closed forms
-
-
-@pytest.mark.parametrize("filling", [0.2, 0.5, 1.0])
-def test_the_block_is_the_one_counted_here(filling):
-    scenario = replace(ICE, water_mass=filling)
-    one = Block.of(scenario)
-    counted = (one.mass, one.inertia, one.height, one.rho, one.about_rim)
-    assert counted == pytest.approx(block(scenario), rel=1e-12, abs=0)
-    assert one.toppling == pytest.approx(static_toppling_angle(scenario), rel=1e-12, abs=0)
-
-
-def test_a_uniform_block_rocks_as_housner_says():
-    """J = M (z^2 + R^2)/3: the ratio is 1 - 1.5 sin^2 alpha."""
-    one = Block(mass=2.0, inertia=2.0 * (0.3**2 + 0.1**2) / 3, height=0.3, radius=0.1, gravity=G)
-    assert corner_ratio(one) == pytest.approx(1 - 1.5 * math.sin(one.toppling) ** 2, rel=1e-12, abs=0)
-    # Nearly upright the fall is that of a linear pendulum upside down.
-    lean = 1e-3
-    slim = Block(mass=2.0, inertia=0.06, height=0.3, radius=0.3 * lean, gravity=G)
-    rate = math.sqrt(slim.saddle / slim.about_rim)
-    assert quarter_period(slim, 0.3 * lean) == pytest.approx(math.acosh(1 / 0.7) / rate, rel=1e-5, abs=0)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.7])
@@ -135,11 +94,9 @@ def test_a_gap_of_a_tenth_of_a_micrometre_is_no_contact(gap):
 def test_rocking_from_corner_to_corner(filling, ratio, period):
     """Ice released on a rim at 0.3 alpha falls through the quarter period and loses (1 - ratio) of its spin."""
     scenario = replace(ICE, water_mass=filling)
-    mass, _, z, _, about_rim = block(scenario)
-    radius = scenario.bottle.radius
-    alpha = math.atan2(radius, z)
-    start = 0.3 * alpha
-    exact, closed = quarter_period(Block.of(scenario), start), corner_ratio(Block.of(scenario))
+    one = Block.of(scenario)
+    start = 0.3 * one.toppling
+    exact, closed = quarter_period(one, start), corner_ratio(one)
     assert exact == pytest.approx(period, abs=1e-6)
     assert closed == pytest.approx(ratio, abs=5e-5)
     table = Table(height=0.0, restitution=0.0, friction=ROUGH)
@@ -150,7 +107,7 @@ def test_rocking_from_corner_to_corner(filling, ratio, period):
     before = run.omega[run.t < exact - 1.5e-4][-1]
     after = run.omega[run.t > exact + 1.5e-4][0]
     # The spin still changes by (M g R / I) dt within the 0.3 ms between the two readings.
-    drift = mass * G * radius / about_rim * 3e-4
+    drift = one.mass * G * one.radius / one.about_rim * 3e-4
     assert abs(after / before - closed) < 1e-3 * closed + drift / abs(before)
 
 
@@ -162,11 +119,11 @@ def test_ice_on_a_rim_ends_as_its_energy_says():
         scenario = replace(ICE, water_mass=random.choice([0.3, 0.6]))
         tilt, speed = -random.uniform(0.02, 0.45), random.uniform(0.5, 3.0)
         sideways, omega = random.uniform(-0.5, 0.5), random.uniform(-10.0, 25.0)
-        upright = ends_upright(Block.of(scenario), tilt, omega, (sideways, -speed))
+        one = Block.of(scenario)
+        upright = ends_upright(one, tilt, omega, (sideways, -speed))
         if upright is None:
             continue
-        _, _, z, _, _ = block(scenario)
-        arm = scenario.bottle.length / 2 - z
+        arm = scenario.bottle.length / 2 - one.height
         velocity = (sideways - omega * arm * math.cos(tilt), -speed - omega * arm * math.sin(tilt))
         outcome = ode_reference.land(at_rest(scenario, tilt, omega, velocity), table)
         assert outcome.decided
@@ -227,7 +184,7 @@ def test_its_flight_is_that_of_the_rods(n):
     scenario = Scenario(n_slices=n, water_mass=0.4, drag=0.1, restitution=0.5, duration=0.12)
     flight = rods_by_events.solve(scenario, times=[0.12])
     axis = np.array([math.sin(scenario.theta0), -math.cos(scenario.theta0)])
-    arm = scenario.bottle.length / 2 - flight.scenario.bottle.length + block(scenario)[2]
+    arm = scenario.bottle.length / 2 - flight.scenario.bottle.length + Block.of(scenario).height
     across = arm * scenario.omega0 * np.array([-axis[1], axis[0]])
     start = at_rest(scenario, scenario.theta0, scenario.omega0, tuple(across))
     run = path(start, Table(height=0.0), drop=5.0, dt=5e-5, every=0.12 - 1e-12, duration=0.12 + 1e-4)
@@ -252,18 +209,17 @@ def test_the_saddle_is_that_of_water_at_rest_not_of_the_touch():
         world_of(at_rest(scenario, r=r), Table(height=0.0), "together") for r in (scenario.initial_positions(), spread)
     )
     assert low.saddle == high.saddle
-    mass, _, _, rho, _ = block(scenario)
-    assert low.saddle == pytest.approx(mass * G * rho, rel=1e-12, abs=0)
+    assert low.saddle == pytest.approx(Block.of(scenario).saddle, rel=1e-12, abs=0)
 
 
-@pytest.mark.parametrize("program", ["ode_reference", "mujoco"])
-def test_ice_that_stands_on_its_cap_is_certain(program):
+PROGRAMS = pytest.mark.parametrize("land", [ode_reference.land, partial(engine_check.land, engine="mujoco")])
+"""Both programs that land bottles."""
+
+
+@PROGRAMS
+def test_ice_that_stands_on_its_cap_is_certain(land):
     """Its energy stays above E_s, but below the saddle out of the basin of the cap."""
-    start = at_rest(replace(ICE, water_mass=0.5), math.pi - 0.01)
-    if program == "ode_reference":
-        outcome = ode_reference.land(start, Table(height=0.0))
-    else:
-        outcome = engine_check.land(start, Table(height=0.0), program, 1e-4)
+    outcome = land(at_rest(replace(ICE, water_mass=0.5), math.pi - 0.01), Table(height=0.0), dt=1e-4)
     assert outcome.outcome == "cap"
     assert 0.0 < outcome.margin < 0.2
 
@@ -334,33 +290,29 @@ def test_a_mirrored_throw_lands_alike():
 # ---------------------------------------------------------------------- bad input
 
 
+CLOSE = WATER.initial_positions() - 0.05 * (np.arange(10) > 4) + 0.005 * (np.arange(10) == 6)
+
+
+@PROGRAMS
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("start", "arguments", "words"),
     [
-        ({"law": "after"}, "law = 'after' is unknown"),
-        ({"dt": 0.1}, r"dt = 0.1 s is outside \[1e-06, 0.001\] s"),
-        ({"dt": math.nan}, "dt = nan"),
+        (at_rest(WATER), {"law": "after"}, "law = 'after' is unknown"),
+        (at_rest(WATER), {"dt": 0.1}, r"dt = 0.1 s is outside .*0.001"),
+        (at_rest(WATER), {"dt": math.nan}, "dt = nan"),
+        (at_rest(ICE), {"law": "together"}, "law = 'together' has no meaning for ice"),
+        (at_rest(WATER, r=np.full(10, WATER.r_max)), {}, r"touch\.r\[1\] = 0\.273 m is outside \[0\.119, 0\.259\] m"),
+        (at_rest(WATER, r=CLOSE), {}, r"touch\.r\[5\] - touch\.r\[6\]"),
     ],
 )
-def test_bad_arguments_are_refused_by_name_and_range(changes, words):
+def test_bad_arguments_are_refused_by_name_and_range(land, start, arguments, words):
     with pytest.raises(ValueError, match=words):
-        ode_reference.land(at_rest(WATER), Table(height=0.0), **changes)
+        land(start, Table(height=0.0), **arguments)
 
 
-def test_ice_has_no_law():
-    with pytest.raises(ValueError, match="law = 'together' has no meaning for ice"):
-        ode_reference.land(at_rest(ICE), Table(height=0.0), law="together")
-
-
-def test_overlapping_slices_are_refused_by_their_place():
-    sunk = np.full(10, WATER.r_max)
-    with pytest.raises(ValueError, match=r"touch\.r\[1\] = 0\.273 m is outside \[0\.119, 0\.259\] m"):
-        ode_reference.land(at_rest(WATER, r=sunk), Table(height=0.0))
-    close = WATER.initial_positions()
-    close[5:] -= 0.05
-    close[6] += 0.005
-    with pytest.raises(ValueError, match=r"touch\.r\[5\] - touch\.r\[6\]"):
-        ode_reference.land(at_rest(WATER, r=close), Table(height=0.0))
+def test_an_unknown_engine_is_refused():
+    with pytest.raises(ValueError, match="engine = 'bullet' is unknown"):
+        engine_check.land(at_rest(WATER), Table(height=0.0), "bullet")
 
 
 def test_nothing_lands_without_gravity():
