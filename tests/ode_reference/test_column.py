@@ -124,21 +124,27 @@ def test_the_reported_parts_fit_the_observables():
     assert np.median(np.abs(late)) < 1e-3
 
 
+@pytest.mark.parametrize("model", ["column", "rods"])
 @pytest.mark.parametrize("changes", [{"water_mass": 1.0}, {"frozen": True}, {"water_mass": 0.1}])
-def test_what_does_not_spread_turns_like_ice(changes):
-    run = ode_reference.solve(throw(0.5, **changes), model="column")
-    assert np.all(run.omega == run.omega[0])
-    np.testing.assert_allclose(run.theta, run.scenario.theta0 + run.scenario.omega0 * run.t, rtol=1e-13)
+def test_what_does_not_spread_turns_like_ice(model, changes):
+    run = ode_reference.solve(throw(0.5, **{"n_slices": 7} | changes), model)
+    within = 1e-14 if model == "rods" else 1e-13
+    np.testing.assert_allclose(run.omega, run.scenario.omega0, rtol=1e-14)
+    np.testing.assert_allclose(run.theta, run.scenario.theta0 + run.scenario.omega0 * run.t, rtol=within)
+    assert np.ptp(run.omega) == np.ptp(run.r, axis=0).max() == 0.0
+    np.testing.assert_allclose(run.r[0], run.scenario.initial_positions(), rtol=1e-13)
 
 
-def test_it_turns_backwards_alike():
-    forth = ode_reference.solve(throw(0.5, theta0=0.4), model="column")
-    back = ode_reference.solve(throw(0.5, theta0=-0.4, omega0=-20.0), model="column")
+@pytest.mark.parametrize("model", ["column", "rods"])
+def test_it_turns_backwards_alike_and_knows_no_restitution(model):
+    forth = ode_reference.solve(throw(0.5, theta0=0.4, drag=0.01), model)
+    back = ode_reference.solve(throw(0.5, theta0=-0.4, omega0=-20.0, drag=0.01, restitution=0.9), model)
     np.testing.assert_allclose(back.theta, -forth.theta, rtol=1e-13)
     np.testing.assert_allclose(back.r, forth.r, rtol=1e-13)
 
 
+@pytest.mark.parametrize("model", ["column", "rods"])
 @pytest.mark.parametrize(("name", "value"), [("rtol", math.nan), ("rtol", 1.0), ("atol", 0.0), ("times", [3.0])])
-def test_bad_input_is_refused_by_name(name, value):
+def test_bad_input_is_refused_by_name(model, name, value):
     with pytest.raises(ValueError, match=name):
-        ode_reference.solve(throw(0.5), model="column", **{name: value})
+        ode_reference.solve(throw(0.5), model, **{name: value})
