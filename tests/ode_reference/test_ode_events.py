@@ -75,58 +75,49 @@ def first_wall(*polynomials, stop, parts=1):
     return flight.t, int(flight.impacts[0][1][0])
 
 
-def test_plain_crossing_is_located_to_round_off():
-    # 0.5 + t + t^2 = 0.9
-    assert first_wall([0.5, 1.0, 1.0], stop=0.5)[0] == pytest.approx((-1 + math.sqrt(2.6)) / 2, abs=BLUR)
+DIP, BEYOND = [0.9 - 0.24, 1.0, -1.0], [0.1 + 0.24, -1.0, 1.0]
+"""Beyond the base, or the cap, between 0.4 and 0.6."""
+
+TURNS_TWICE = min(root.real for root in np.roots([0.12, -0.12, 0.03, -0.002]) if abs(root.imag) < 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("slices", "stop", "time", "who", "within"),
+    [
+        pytest.param([[0.5, 1.0, 1.0]], 0.5, (-1 + math.sqrt(2.6)) / 2, 0, BLUR, id="plain crossing"),
+        # The second slice passes for good at 0.9, the first is out between 0.4 and 0.6: the foremost is found at 0.9.
+        pytest.param([DIP, [0.0 + 0.495, 0.0, 0.5]], 1.0, 0.4, 0, BLUR, id="dip behind which another slice passes"),
+        pytest.param([[0.9 - 0.24, 0.97, -1.0]], 1.0, NEVER, None, 0.0, id="dip that stops short"),
+        pytest.param([[0.9, -1.0, 0.3]], 1.0, NEVER, None, 0.0, id="a slice that leaves the wall"),
+        pytest.param([[0.9, -1.0, 0.3], [0.5, 1.0]], 1.0, 0.4, 1, BLUR, id="one that leaves, another hits"),
+        *(
+            pytest.param([[0.9, -u, 20.0]], 1.0, u / 20.0, 0, 1e-12 / 20.0, id=f"leaves at {u} m/s and returns")
+            for u in (1.0, 1e-3, 1e-6)
+        ),
+        # It starts there with v = 0 and a < 0, and is back at t = 0.05.
+        pytest.param([[0.9, 0.0, -0.05, 1.0]], 1.0, 0.05, 0, 1e-12, id="released at rest and pushed back"),
+        # 0.898 + 0.12 t (t - 0.5)^2: beyond 0.9 around t = 1/6, inside and rising at both ends of the step.
+        pytest.param([[0.898, 0.03, -0.12, 0.12]], 0.6, TURNS_TWICE, 0, 1e-12, id="turns twice within one step"),
+        # The first passes at sqrt(0.2), the second, which gets deepest, at 0.2 / 0.9.
+        pytest.param(
+            [[0.5, 0.0, 2.0], [0.8, 1.0, -0.9], [0.14, -1.0, 6.2]],
+            0.9,
+            (1 - math.sqrt(1 - 4 * 6.2 * 0.04)) / 12.4,
+            2,
+            BLUR,
+            id="the earliest of several",
+        ),
+    ],
+)
+def test_the_first_hit_of_a_step_is_found(slices, stop, time, who, within):
+    assert first_wall(*slices, stop=stop) == (time if time == NEVER else pytest.approx(time, abs=within), who)
 
 
 @pytest.mark.parametrize("parts", [1, 2, 3])
 @pytest.mark.parametrize("stop", [1.0, 0.55])
-def test_dip_through_the_wall_is_found_whether_or_not_it_is_over_when_the_step_ends(stop, parts):
-    # Beyond the base between 0.4 and 0.6.
-    assert first_wall([0.9 - 0.24, 1.0, -1.0], stop=stop, parts=parts)[0] == pytest.approx(0.4, abs=BLUR)
-    # Beyond the cap.
-    assert first_wall([0.1 + 0.24, -1.0, 1.0], stop=stop, parts=parts)[0] == pytest.approx(0.4, abs=BLUR)
-
-
-def test_dip_behind_which_another_slice_passes_is_found():
-    # The second slice passes for good at 0.9, the first is out between 0.4 and 0.6: the foremost is found at 0.9.
-    time, who = first_wall([0.9 - 0.24, 1.0, -1.0], [0.0 + 0.495, 0.0, 0.5], stop=1.0)
-    assert (time, who) == (pytest.approx(0.4, abs=BLUR), 0)
-
-
-def test_dip_that_stops_short_of_the_wall_is_no_event():
-    assert first_wall([0.9 - 0.24, 0.97, -1.0], stop=1.0)[0] == NEVER
-
-
-def test_slice_that_leaves_the_wall_is_not_found_at_the_start():
-    assert first_wall([0.9, -1.0, 0.3], stop=1.0)[0] == NEVER
-    # Nor when another slice ends the step.
-    assert first_wall([0.9, -1.0, 0.3], [0.5, 1.0], stop=1.0) == (pytest.approx(0.4, abs=BLUR), 1)
-
-
-@pytest.mark.parametrize("speed", [1.0, 1e-3, 1e-6])
-def test_slice_that_leaves_and_returns_within_one_step_is_found_at_its_return(speed):
-    time, _ = first_wall([0.9, -speed, 0.5 * 40.0], stop=1.0)
-    assert time == pytest.approx(2 * speed / 40.0, rel=1e-12 / speed, abs=0.0)
-
-
-def test_slice_released_at_rest_that_is_pushed_back_within_one_step_is_found_at_its_return():
-    # r = 0.9 - 0.05 t^2 + t^3 is back at the base at t = 0.05, and starts there with v = 0 and a < 0.
-    assert first_wall([0.9, 0.0, -0.05, 1.0], stop=1.0)[0] == pytest.approx(0.05, abs=1e-12)
-
-
-def test_slice_that_turns_twice_within_one_step_is_found_at_its_first_contact():
-    # r = 0.898 + 0.12 t (t - 0.5)^2: beyond 0.9 around t = 1/6, inside and rising at both ends of the step.
-    exact = min(root.real for root in np.roots([0.12, -0.12, 0.03, -0.002]) if abs(root.imag) < 1e-12)
-    assert first_wall([0.898, 0.03, -0.12, 0.12], stop=0.6)[0] == pytest.approx(exact, abs=1e-12)
-
-
-def test_the_earliest_of_several_is_returned_even_if_another_is_deeper():
-    times = [math.sqrt(0.2), (1 - math.sqrt(1 - 0.36)) / 1.8, (1 - math.sqrt(1 - 4 * 6.2 * 0.04)) / 12.4]
-    result = first_wall([0.5, 0.0, 2.0], [0.8, 1.0, -0.9], [0.14, -1.0, 6.2], stop=0.9)
-    assert result == (pytest.approx(min(times), abs=BLUR), 2)
-    assert int(np.argmin(times)) == 2
+@pytest.mark.parametrize("path", [DIP, BEYOND], ids=["base", "cap"])
+def test_dip_through_the_wall_is_found_whether_or_not_it_is_over_when_the_step_ends(path, stop, parts):
+    assert first_wall(path, stop=stop, parts=parts)[0] == pytest.approx(0.4, abs=BLUR)
 
 
 def test_held_slices_are_not_asked():
