@@ -21,15 +21,15 @@ def full_bottle(n_slices, restitution, damping_rate):
     )
 
 
-@pytest.mark.parametrize("damping_rate", [0.0, 5.0])
-@pytest.mark.parametrize("restitution", [0.0, 0.2, 0.5, 0.9, 1.0])
-@pytest.mark.parametrize("n_slices", [4, 5, 12, 21])
+@pytest.mark.parametrize("damping_rate", [0.0, 5.0, 15.0])
+@pytest.mark.parametrize("restitution", [0.0, 0.2, 0.5, 0.8, 0.9, 0.95, 1.0])
+@pytest.mark.parametrize("n_slices", [2, 3, 4, 5, 7, 12, 21, 31, 60])
 def test_a_full_bottle_stays_its_own_mirror_image(n_slices, restitution, damping_rate):
     scenario = full_bottle(n_slices, restitution, damping_rate)
     flight = solve(scenario, "free-flight", times=np.linspace(0.0, 0.5, 101))
     assert flight.ok, flight.message
-    assert np.abs(flight.r + flight.r[:, ::-1] - scenario.bottle.length).max() < 1e-9
-    assert len(flight.impacts) >= 2
+    assert np.abs(flight.r + flight.r[:, ::-1] - scenario.bottle.length).max() < 1e-10
+    assert len(flight.impacts) >= (2 if n_slices > 3 else 0)
     # Every impact has its image at the other end, and both count as one instant.
     instants = np.concatenate([[0.0], flight.impacts.time])
     assert flight.diagnostics["opposite_hits"] == np.count_nonzero(np.diff(instants) > TOGETHER)
