@@ -213,9 +213,3 @@ def test_the_drag_law_takes_energy_whichever_way_a_slice_slides():
     to_centre = flight.v - THROW.slice_mass * flight.v.sum(axis=1, keepdims=True) / THROW.total_mass
     power = -10.0 * THROW.slice_mass * (np.abs(flight.v) * flight.v * to_centre).sum(axis=1)
     assert books["residual"] == pytest.approx(np.trapezoid(power, flight.t), rel=1e-4, abs=0.0)
-
-
-def test_the_reduced_flow_refuses_a_law_that_no_set_of_switches_makes():
-    law = block_of("A drag law")["LAW"]
-    with pytest.raises(ValueError, match="quadratic-drag"):
-        ode_reference.solve(THROW, law)
