@@ -1,12 +1,14 @@
-"""The one result object: shapes, honesty, immutability."""
+"""The one result object: shapes, honesty, immutability; its line, table, plot, and tables for pandas and xarray."""
 
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 import slicemodel
-from slicemodel import Impacts, Scenario, Trajectory
+from slicemodel import Impacts, Scenario, Trajectory, trajectory
 from slicemodel.trajectory import output_times
 
 SCENARIO = Scenario(n_slices=2)
@@ -28,19 +30,19 @@ def fields(**changes):
     return values | changes
 
 
-def test_arrays_cannot_be_written():
-    trajectory = Trajectory(**fields())
+def test_arrays_may_hold_huge_values_and_cannot_be_written():
+    run = Trajectory(**fields(omega=[20.0, 1e300]))
     for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
         with pytest.raises(ValueError, match="read-only"):
-            getattr(trajectory, name)[0] = 1.0
+            getattr(run, name)[0] = 1.0
     with pytest.raises(TypeError):
-        trajectory.settings["dt"] = 1.0
+        run.settings["dt"] = 1.0
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"omega": [20.0, np.nan]}, "omega holds values that are not finite"),
+        *(({"omega": [20.0, bad]}, "omega holds values that are not finite") for bad in (np.nan, np.inf, -np.inf)),
         ({"r": np.full((2, 2), np.inf)}, "r holds values"),
         ({"theta": [1.0]}, "theta has shape"),
         ({"r": np.zeros((2, 3))}, "r has shape"),
@@ -54,12 +56,12 @@ def test_nothing_dishonest_can_be_built(changes, words):
 
 
 def test_pickles_with_everything():
-    trajectory = slicemodel.solve(Scenario(n_slices=5), steps=50)
-    copy = pickle.loads(pickle.dumps(trajectory))
-    np.testing.assert_array_equal(copy.r, trajectory.r)
-    np.testing.assert_array_equal(copy.impacts.time, trajectory.impacts.time)
-    assert copy.settings == trajectory.settings
-    assert copy.scenario == trajectory.scenario
+    run = slicemodel.solve(Scenario(n_slices=5), steps=50)
+    copy = pickle.loads(pickle.dumps(run))
+    np.testing.assert_array_equal(copy.r, run.r)
+    np.testing.assert_array_equal(copy.impacts.time, run.impacts.time)
+    assert copy.settings == run.settings
+    assert copy.scenario == run.scenario
     with pytest.raises(ValueError, match="read-only"):
         copy.r[0, 0] = 1.0
 
@@ -88,3 +90,64 @@ def test_default_times_are_a_thousand_with_both_ends():
 def test_bad_times_are_named(times, words):
     with pytest.raises(ValueError, match=words):
         output_times(SCENARIO, times)
+
+
+# ---------------------------------------------------------------------- in one's hands
+
+RUN = slicemodel.solve(Scenario(n_slices=3, duration=0.1), scheme="midpoint", steps=11)
+SHORT = slicemodel.solve(Scenario(n_slices=3, duration=0.1), scheme="midpoint", steps=11, store="summary")
+
+
+def test_repr_is_one_line():
+    said = repr(RUN)
+    assert said.startswith("<Trajectory midpoint: 11 points, N = 3, t = 0 to 0.1 s, omega = 20 to ")
+    assert "\n" not in said
+    broken = slicemodel.solve(Scenario(), scheme="published-matlab")
+    assert repr(broken).endswith(", overflow>")
+
+
+def test_a_notebook_shows_a_table():
+    page = RUN._repr_html_()
+    assert page.startswith("<p>&lt;Trajectory midpoint")
+    assert page.count("<tr>") == 4
+
+
+def test_plot_draws_into_given_or_new_axes():
+    axes = RUN.plot()
+    assert SHORT.plot(axes) is axes
+    assert [len(line.get_xdata()) for line in axes.lines] == [11, 11]
+    assert axes.get_ylabel() == "omega [rad/s]"
+
+
+def test_matplotlib_is_loaded_by_plot_alone():
+    code = "import slicemodel as s, sys; repr(s.solve(s.Scenario(n_slices=2), steps=5));"
+    code += "sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_to_pandas():
+    pytest.importorskip("pandas")
+    frame = RUN.to_pandas()
+    assert list(frame.columns[:6]) == ["t", "theta", "omega", "r_cm", "inertia", "r_0"]
+    np.testing.assert_array_equal(frame["v_2"], RUN.v[:, 2])
+    assert frame.attrs["method"] == "midpoint"
+    assert len(SHORT.to_pandas().columns) == 5
+
+
+def test_to_xarray():
+    pytest.importorskip("xarray")
+    data = RUN.to_xarray()
+    assert data["r"].dims == ("t", "slice")
+    assert data["omega"].attrs["units"] == "rad/s"
+    np.testing.assert_array_equal(data["t"], RUN.t)
+    assert "r" not in SHORT.to_xarray()
+
+
+@pytest.mark.parametrize("name", ["pandas", "xarray"])
+def test_a_missing_extra_is_a_plain_hint(monkeypatch, name):
+    def missing(wanted):
+        raise ModuleNotFoundError(wanted)
+
+    monkeypatch.setattr(trajectory, "import_module", missing)
+    with pytest.raises(ImportError, match=rf"{name} is not installed; pip install 'flipproof\[{name}\]'"):
+        getattr(RUN, f"to_{name}")()
