@@ -69,15 +69,32 @@ def test_impossible_values_are_refused_by_field_value_and_range(changes, words):
         assert word in str(refusal.value)
 
 
-@pytest.mark.parametrize("field", ["water_mass", "drag", "restitution", "omega0", "theta0", "duration", "gravity"])
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_no_field_takes_nan_or_infinity(field, value):
-    with pytest.raises(ScenarioError, match=field):
-        Scenario(**{field: value})
+ABSURD = (5e-324, 1e-300, 1e-16, 1e16, 1e200, 1e308, math.inf)
+NUMBERS = [field.name for field in dataclasses.fields(Scenario) if isinstance(field.default, float)]
+LENGTHS = [field.name for field in dataclasses.fields(Bottle)]
 
 
-@pytest.mark.parametrize("field", ["length", "radius", "mass", "capacity"])
-@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, "1", None])
+@pytest.mark.parametrize("value", [*ABSURD, *(-value for value in ABSURD), math.nan])
+def test_absurd_numbers_are_refused_by_name_or_harmless(value):
+    """What is not refused is a small number beside zero, where zero is allowed, too."""
+    for name in LENGTHS:
+        with pytest.raises(
+            ScenarioError, match=rf"^bottle\.{name} = {re.escape(repr(value))} k?[mg] is outside \[1e-15, 1e\+15\]$"
+        ):
+            Bottle(**{name: value})
+    for name in NUMBERS:
+        allowed = abs(value) < 1e-15 and (
+            name == "theta0" or (value > 0 and name in ("drag", "gravity", "restitution"))
+        )
+        if allowed:
+            Scenario(**{name: value})
+        else:
+            with pytest.raises(ScenarioError, match=rf"^{name} = {re.escape(repr(value))} .*\[.*\]"):
+                Scenario(**{name: value})
+
+
+@pytest.mark.parametrize("field", LENGTHS)
+@pytest.mark.parametrize("value", [0.0, -1.0, "1", None])
 def test_no_bottle_is_impossible(field, value):
     with pytest.raises(ScenarioError, match=rf"bottle\.{field}"):
         Bottle(**{field: value})
@@ -114,17 +131,16 @@ def test_with_slices_keeps_the_damping_rate():
         Scenario().with_slices(0)
 
 
-def test_toml_round_trip(tmp_path):
+def test_toml_and_pickle_round_trip(tmp_path):
     scenario = Scenario(bottle=Bottle(length=0.22), theta0=1.1, launch_velocity=(1, 2), frozen=True)
     file = tmp_path / "throw.toml"
     file.write_text(scenario.to_toml(), encoding="utf-8")
-    assert Scenario.from_toml(file) == scenario
+    assert Scenario.from_toml(file) == pickle.loads(pickle.dumps(scenario)) == scenario
 
 
 def test_empty_file_is_the_default_throw(tmp_path):
-    file = tmp_path / "empty.toml"
-    file.write_text("", encoding="utf-8")
-    assert Scenario.from_toml(str(file)) == Scenario()
+    (tmp_path / "empty.toml").touch()
+    assert Scenario.from_toml(str(tmp_path / "empty.toml")) == Scenario()
 
 
 @pytest.mark.parametrize(
@@ -174,38 +190,9 @@ def test_a_device_or_a_pipe_is_refused_at_once(tmp_path, place):
 def test_what_a_shell_feeds_is_read():
     code = "from slicemodel import Scenario; print(Scenario.from_toml('/dev/stdin').drag)"
     told = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        input="[scenario]\ndrag = 0.25\n",
-        capture_output=True,
-        text=True,
-        check=True,
+        [sys.executable, "-c", code], cwd=ROOT, input=b"[scenario]\ndrag = 0.25\n", capture_output=True, check=True
     )
-    assert told.stdout == "0.25\n"
-
-
-ABSURD = (5e-324, 1e-300, 1e-16, 1e16, 1e200, 1e308)
-NUMBERS = [field.name for field in dataclasses.fields(Scenario) if isinstance(field.default, float)]
-LENGTHS = [field.name for field in dataclasses.fields(Bottle)]
-
-
-@pytest.mark.parametrize("value", [*ABSURD, *(-value for value in ABSURD)])
-def test_absurd_numbers_are_refused_by_name_or_harmless(value):
-    """What is not refused is a small number beside zero, where zero is allowed, too."""
-    for name in LENGTHS:
-        with pytest.raises(
-            ScenarioError, match=rf"^bottle\.{name} = {re.escape(repr(value))} k?[mg] is outside \[1e-15, 1e\+15\]$"
-        ):
-            Bottle(**{name: value})
-    for name in NUMBERS:
-        allowed = abs(value) < 1e-15 and (
-            name == "theta0" or (value > 0 and name in ("drag", "gravity", "restitution"))
-        )
-        if allowed:
-            Scenario(**{name: value})
-        else:
-            with pytest.raises(ScenarioError, match=rf"^{name} = {re.escape(repr(value))} .*\[.*\]"):
-                Scenario(**{name: value})
+    assert told.stdout == b"0.25\n"
 
 
 @pytest.mark.parametrize("theta0", [85, 85.0, -360.0])
@@ -228,10 +215,6 @@ def test_what_is_no_angle_is_not_asked_about_degrees(theta0):
     with pytest.raises(ScenarioError, match="theta0") as refused:
         Scenario(theta0=theta0)
     assert "degrees" not in str(refused.value)
-
-
-def test_pickles():
-    assert pickle.loads(pickle.dumps(Scenario(drag=0.3))) == Scenario(drag=0.3)
 
 
 @pytest.mark.parametrize(
