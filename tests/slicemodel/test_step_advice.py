@@ -9,20 +9,21 @@ from slicemodel import Scenario, required_steps
 SMALL = Scenario().with_slices(5)
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1.0, math.nan, math.inf, "small", True])
-def test_tolerance_out_of_range_is_named(tolerance):
-    with pytest.raises(ValueError, match=r"tolerance = .* is outside \(0, 1\)"):
-        required_steps(SMALL, tolerance)
-
-
-def test_unknown_scheme_is_named():
-    with pytest.raises(ValueError, match="did you mean 'midpoint'"):
-        required_steps(SMALL, 1e-3, "midpont")
-
-
-def test_a_scheme_whose_slices_escape_has_no_answer():
-    with pytest.raises(ValueError, match="published-matlab has no step size to ask for on this throw: "):
-        required_steps(SMALL, 1e-3, "published-matlab")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        *(
+            ((tolerance,), r"tolerance = .* is outside \(0, 1\)")
+            for tolerance in (0.0, -1e-3, 1.0, math.nan, math.inf, "small", True)
+        ),
+        ((1e-3, "midpont"), "did you mean 'midpoint'"),
+        # Its slices escape.
+        ((1e-3, "published-matlab"), "published-matlab has no step size to ask for on this throw: "),
+    ],
+)
+def test_what_has_no_answer_is_refused_by_name(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        required_steps(SMALL, *arguments)
 
 
 def test_a_tolerance_out_of_reach_is_said_so(monkeypatch):
