@@ -102,3 +102,18 @@ def test_random_throws_have_the_same_impacts(agreement, count):
         if not agreement.is_chaotic(case, mine):
             assert_agree(agreement, case)
             calm += 1
+
+
+@pytest.mark.parametrize("model", ["eq8", "accelerating-origin", "free-flight"])
+def test_heyoka_finds_the_impacts_of_the_reduced_flow(monkeypatch, model):
+    """A third integrator of the equations, where it is installed."""
+    pytest.importorskip("heyoka", reason="the extra 'heyoka' is not installed")
+    monkeypatch.setattr(sys, "path", [*sys.path, str(FILE.parent)])
+    from flow_agreement import Case, first_parting, flow
+    from heyoka_witness import fly
+
+    case = Case(Scenario().with_slices(4), model)
+    result, ours = fly(case), flow(case)
+    assert len(result.impacts) == len(ours.impacts) > 15
+    assert first_parting(result, ours) == ""
+    assert result.omega == pytest.approx(ours.omega[-1], rel=1e-11, abs=0.0)

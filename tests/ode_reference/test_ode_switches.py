@@ -77,14 +77,6 @@ def test_every_combination_runs_and_closes_its_energy_ledger(switches):
     assert abs(ledger["residual"]) < 1e-9 * ledger["initial"]
 
 
-@pytest.mark.parametrize("name", LADDER)
-def test_a_rung_and_its_switches_make_the_same_run(name):
-    scenario = Scenario(n_slices=8, drag=0.625, duration=0.25)
-    result, general = solve(scenario, name), solve(scenario, MODELS[name].switches)
-    np.testing.assert_allclose(general.omega, result.omega, rtol=1e-7)
-    assert abs(len(general.impacts) - len(result.impacts)) <= 2
-
-
 def test_switches_without_effect_make_no_difference():
     def omega(*on):
         return solve(SCENARIO, Switches(**dict.fromkeys(on, True)), times=[0.3]).omega[0]
