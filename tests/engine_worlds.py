@@ -1,4 +1,4 @@
-"""A throw in which no slip hides, and faults of the worlds that pymunk flies."""
+"""A throw in which no slip hides, faults of the worlds that pymunk flies, and the energy of what an engine flew."""
 
 import pymunk
 
@@ -60,3 +60,11 @@ def drag_against_the_lab(world):
 def caps_not_in_the_space(world):
     """They stay on the body, which is no place to look for what a slice can meet."""
     world.space.remove(*world.tube.shapes)
+
+
+def energy(run):
+    """Return it in the frame of the centre of mass [J]: rotation, slices along the axis, recoil of the tube."""
+    scenario = run.scenario
+    recoil = scenario.slice_mass * run.v.sum(axis=1) / scenario.total_mass
+    axial = scenario.slice_mass * ((run.v - recoil[:, None]) ** 2).sum(axis=1) + scenario.bottle.mass * recoil**2
+    return (run.inertia * run.omega**2 + axial) / 2

@@ -136,10 +136,3 @@ def test_not_finite_is_a_cause():
     assert state.finite
     assert not replace(state, angle=np.inf).finite
     assert not kicked(state, 0, np.nan).finite
-
-
-def test_every_band_has_a_reason_and_a_remedy():
-    for bound in BOUNDS.values():
-        assert bound.limit > 0
-        assert bound.reason
-        assert bound.remedy

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from engine_worlds import energy
 
 import ode_reference
 from engine_check import solve
@@ -28,14 +29,6 @@ def fly(scenario, dt=1e-4, times=TIMES, **knobs):
 
 def reference(scenario, times=TIMES, **settings):
     return ode_reference.solve(scenario, model="free-flight", times=times, **settings)
-
-
-def energy(run):
-    """Energy in the frame of the centre of mass [J]: rotation, slices along the axis, recoil of the tube."""
-    scenario = run.scenario
-    recoil = scenario.slice_mass * run.v.sum(axis=1) / scenario.total_mass
-    axial = scenario.slice_mass * ((run.v - recoil[:, None]) ** 2).sum(axis=1) + scenario.bottle.mass * recoil**2
-    return (run.inertia * run.omega**2 + axial) / 2
 
 
 @pytest.mark.parametrize("scenario", [PAIR, TEN, FIFTY], ids=["2", "10", "50"])
