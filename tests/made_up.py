@@ -1,8 +1,10 @@
 """Flights that were not made: trajectories as told, runs answered from a table, reports some of whose runs failed."""
 
+import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -44,6 +46,46 @@ def command(capsys, *arguments):
         status = end.code
     printed, said = capsys.readouterr()
     return status, printed, said
+
+
+def action(*arguments):
+    """Run a command as the command line does, but let its exceptions through."""
+    options = cli.parser().parse_args([str(argument) for argument in arguments])
+    return options.action(options)
+
+
+def refused(capsys, words, *arguments):
+    """Give the command line what it must refuse: status 2, nothing printed, and one line of error with these words."""
+    status, printed, said = command(capsys, *arguments)
+    assert (status, printed, said.count("\n")) == (2, "", 1)
+    assert "error: " in said
+    for each in [words] if isinstance(words, str) else words:
+        assert each in said
+
+
+def wait_for(condition):
+    """Wait until a condition holds, for five minutes at most."""
+    until = time.monotonic() + 300.0
+    while not condition():
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
+def alive(pid):
+    """Whether a process lives, by /proc."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def is_number(cell):
+    """Whether a cell of a table holds a number."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 class Answers(Executor):

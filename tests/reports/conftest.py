@@ -1,6 +1,7 @@
-"""A reader of pages."""
+"""A reader of pages, and where programs find the packages."""
 
 import html.parser
+from pathlib import Path
 
 import pytest
 
@@ -33,6 +34,14 @@ class Page(html.parser.HTMLParser):
     def handle_data(self, data):
         if self.open and self.open[-1] == "figcaption" and data.strip():
             self.captions.append(data.strip())
+
+
+@pytest.fixture(scope="module")
+def found_by_programs():
+    """Programs that a test starts find the packages of this copy."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[2]))
+        yield
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """A report killed at any moment: the next one finds the old report whole, and leaves no process and no folder."""
 
-import importlib.util
 import os
 import random
 import subprocess
@@ -9,15 +8,13 @@ import time
 from pathlib import Path
 
 import pytest
+import sweep_kill
 
 from flipproof.output.folder import UNFINISHED
 
 ROOT = Path(__file__).resolve().parents[2]
 
-SPEC = importlib.util.spec_from_file_location("sweep_kill", ROOT / "benchmarks" / "sweep_kill.py")
-sweep_kill = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(sweep_kill)
-
+pytestmark = pytest.mark.usefixtures("found_by_programs")
 STAND_IN = """
 import sys
 from pathlib import Path
@@ -36,13 +33,6 @@ if __name__ == "__main__":
         (folder / "summary.json").write_text("whole")
 """
 """What a report does, in small: runs in the pool, then a folder."""
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _path():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(ROOT))
-        yield
 
 
 def kill_and_finish(command, target, moments):

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from made_up import refused
 
 from flipproof.cli.main import main
 from flipproof.output.scene import write_scene
@@ -94,5 +95,4 @@ def test_the_command_writes_the_folder_and_refuses_ice(tmp_path, capsys):
         "scene.xml", "scene.json", "answers.csv", "readback.py",
     }  # fmt: skip
     throw.write_text("[scenario]\nfrozen = true\n")
-    assert main(["scene", str(throw), "--out", str(tmp_path / "ice")]) == 2
-    assert "frozen" in capsys.readouterr().err
+    refused(capsys, "frozen", "scene", throw, "--out", tmp_path / "ice")

@@ -1,6 +1,5 @@
 """Sweeps as people run them: killed, interrupted, resumed, on this machine and through Dask, with the same rows."""
 
-import importlib.util
 import os
 import random
 import re
@@ -10,23 +9,15 @@ import sys
 from pathlib import Path
 
 import pytest
-from made_up import command
+import sweep_kill
+from made_up import command, refused
 
 from flipproof.sweep.design import read_design
 
 ROOT = Path(__file__).resolve().parents[2]
 POINTS = 160
 
-SPEC = importlib.util.spec_from_file_location("sweep_kill", ROOT / "benchmarks" / "sweep_kill.py")
-sweep_kill = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(sweep_kill)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _path():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(ROOT))
-        yield
+pytestmark = pytest.mark.usefixtures("found_by_programs")
 
 
 @pytest.fixture(scope="module")
@@ -132,13 +123,9 @@ def test_a_disk_that_takes_no_more_ends_the_sweep_in_one_line(undisturbed, tmp_p
     assert set(kept) <= set(sweep_kill.rows(out))
 
 
-def run(capsys, *arguments):
-    return command(capsys, "sweep", *arguments)
-
-
 def test_a_complete_sweep_is_not_made_again_and_is_exported(undisturbed, capsys):
     design, out = undisturbed
-    status, line, err = run(capsys, design, "--out", out, "--export", out / "rows.csv")
+    status, line, err = command(capsys, "sweep", design, "--out", out, "--export", out / "rows.csv")
     assert (status, err) == (0, "")
     assert line.startswith(f"{POINTS} points in {out / 'sweep.sqlite'}: ")
     assert line.endswith(f"; {POINTS} were there\n")
@@ -161,15 +148,11 @@ def test_a_complete_sweep_is_not_made_again_and_is_exported(undisturbed, capsys)
 )
 def test_every_mistake_is_one_line_and_status_2(undisturbed, capsys, tmp_path, arguments, words):
     design, out = undisturbed
-    text = design.read_text()
-    (tmp_path / "wrong.toml").write_text(text.replace("rtol = 1e-6", "rtol = 6.0"))
-    places = {"design": design, "out": out, "new": tmp_path / "new"}
-    places |= {"wrong": tmp_path / "wrong.toml"}
-    status, printed, err = run(capsys, *(argument.format(**places) for argument in arguments))
-    assert (status, printed) == (2, "")
-    assert len([line for line in err.splitlines() if "error:" in line]) == 1
-    assert words in err
-    assert not (tmp_path / "new").exists()
+    wrong, new = tmp_path / "wrong.toml", tmp_path / "new"
+    wrong.write_text(design.read_text().replace("rtol = 1e-6", "rtol = 6.0"))
+    places = {"design": design, "out": out, "new": new, "wrong": wrong}
+    refused(capsys, words, "sweep", *(argument.format(**places) for argument in arguments))
+    assert not new.exists()
 
 
 def test_the_example_is_a_sweep():
