@@ -31,6 +31,21 @@ def read_report(folder: Path) -> set[str]:
     return {file.read_text() for file in folder.iterdir() if file.name not in (MARKER, ".DS_Store")}
 
 
+@pytest.fixture
+def target(tmp_path):
+    """A report that is there; whatever comes of a test, nothing else may be left beside it."""
+    with replaced_folder(tmp_path / "latest", "report") as folder:
+        make_report(folder, "old")
+    yield tmp_path / "latest"
+    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
+
+
+def refused(words: str, target: Path) -> None:
+    """Ask for a report in a folder where none may be made."""
+    with pytest.raises(OutputError, match=words), replaced_folder(target, "report"):
+        raise AssertionError
+
+
 def test_a_new_report_takes_the_place_of_the_old(tmp_path):
     target = tmp_path / "out" / "latest"
     for text in ("first", "second"):
@@ -41,37 +56,28 @@ def test_a_new_report_takes_the_place_of_the_old(tmp_path):
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
-def test_a_broken_run_leaves_the_old_report_whole(tmp_path, error):
-    target = tmp_path / "latest"
-    with replaced_folder(target, "report") as folder:
-        make_report(folder, "old")
+def test_a_broken_run_leaves_the_old_report_whole(target, error):
     with pytest.raises(error), replaced_folder(target, "report") as folder:  # noqa: PT012
         (folder / "index.html").write_text("half")
         raise error
     assert read_report(target) == {"old"}
-    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
 
 
-def test_a_run_that_died_between_the_two_renames_is_repaired(tmp_path):
-    target = tmp_path / "latest"
-    with replaced_folder(target, "report") as folder:
-        make_report(folder, "old")
-    beside = tmp_path / f"latest{UNFINISHED}"
+def test_a_run_that_died_between_the_two_renames_is_repaired(target):
+    beside = target.with_name(f"latest{UNFINISHED}")
     (beside / "new").mkdir(parents=True)
     (beside / "lock").write_text("123456789")
     target.rename(beside / "old")
     with pytest.raises(ValueError, match="broken"), replaced_folder(target, "report"):
         raise ValueError("broken")
     assert read_report(target) == {"old"}
-    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
 
 
 def test_other_peoples_files_are_not_replaced(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
     with pytest.raises(OutputError, match=r"holds thesis\.tex and not flipproof's own marker"):
         check_replaceable(tmp_path, "report")
-    with pytest.raises(OutputError, match=r"holds thesis\.tex"), replaced_folder(tmp_path, "report"):
-        pass
+    refused(r"holds thesis\.tex", tmp_path)
     assert (tmp_path / "thesis.tex").read_text() == "mine"
     with pytest.raises(OutputError, match="is a file"):
         check_replaceable(tmp_path / "thesis.tex", "report")
@@ -81,23 +87,16 @@ def test_a_folder_with_a_summary_is_not_ours_for_that(tmp_path):
     for name in ("summary.json", "index.html", "thesis.tex"):
         (tmp_path / "latest").mkdir(exist_ok=True)
         (tmp_path / "latest" / name).write_text("mine")
-    with pytest.raises(OutputError) as refused, replaced_folder(tmp_path / "latest", "report"):
-        pass
-    words = str(refused.value)
-    assert "latest holds index.html and 2 more and not flipproof's own marker .flipproof" in words
-    assert words.endswith("or move this one away if an older flipproof wrote it")
+    refused(r"latest holds index.html and 2 more and not flipproof's own marker .flipproof", tmp_path / "latest")
     assert sorted(p.name for p in (tmp_path / "latest").iterdir()) == ["index.html", "summary.json", "thesis.tex"]
     assert [p.name for p in tmp_path.iterdir()] == ["latest"]
 
 
 @pytest.mark.parametrize("place", ["notes.txt", "figures/notes.txt", "link"])
-def test_a_report_with_a_file_of_the_users_is_not_replaced(tmp_path, place):
-    target = tmp_path / "latest"
-    with replaced_folder(target, "report") as folder:
-        make_report(folder, "old")
-        (folder / "figures").mkdir()
+def test_a_report_with_a_file_of_the_users_is_not_replaced(target, place):
+    (target / "figures").mkdir()
     if place == "link":
-        (target / place).symlink_to(tmp_path)
+        (target / place).symlink_to(target.parent)
     else:
         (target / place).write_text("mine")
     with pytest.raises(OutputError, match=rf"holds {place}, which flipproof did not write"):
@@ -114,21 +113,16 @@ def test_a_file_put_there_while_the_report_was_made_is_not_lost(tmp_path):
     assert [p.name for p in tmp_path.rglob("*")] == ["latest", "notes.txt"]
 
 
-def test_what_a_desktop_leaves_behind_is_nobodys(tmp_path):
-    target = tmp_path / "latest"
-    with replaced_folder(target, "report") as folder:
-        make_report(folder, "old")
+def test_what_a_desktop_leaves_behind_is_nobodys(target):
     (target / ".DS_Store").write_text("")
     with replaced_folder(target, "report") as folder:
         make_report(folder, "new")
     assert read_report(target) == {"new"}
 
 
-def test_one_kind_does_not_replace_another(tmp_path):
-    with replaced_folder(tmp_path / "latest", "report") as folder:
-        make_report(folder, "old")
-    with pytest.raises(OutputError, match="holds a flipproof report, not a fit; name another folder"):
-        check_replaceable(tmp_path / "latest", "fit")
+def test_one_kind_does_not_replace_another(target):
+    with pytest.raises(OutputError, match="holds a flipproof report, not a fit"):
+        check_replaceable(target, "fit")
 
 
 @pytest.mark.parametrize(
@@ -158,36 +152,27 @@ def test_folders_of_similar_names_are_nobodys_business(tmp_path):
     assert len(list(tmp_path.glob("*/mine.txt"))) == 4
     (tmp_path / f"latest{UNFINISHED}").mkdir()
     (tmp_path / f"latest{UNFINISHED}" / "mine.txt").write_text("mine")
-    with (
-        pytest.raises(OutputError, match=r"holds mine\.txt, which flipproof did not write"),
-        replaced_folder(tmp_path / "latest", "report"),
-    ):
-        pass
+    refused(r"holds mine\.txt, which flipproof did not write", tmp_path / "latest")
     assert len(list(tmp_path.glob("*/mine.txt"))) == 5
 
 
-def test_two_writers(tmp_path):
-    """The second is told who is the first, and touches nothing."""
-    target = tmp_path / "latest"
+def test_a_second_writer_is_told_who_is_the_first_and_touches_nothing(target):
     code = "import sys; from pathlib import Path; from flipproof.output.folder import replaced_folder\n"
     code += "with replaced_folder(Path(sys.argv[1]), 'report') as f: print('in', flush=True); input()"
     first = subprocess.Popen(
         [sys.executable, "-c", code, str(target)], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert first.stdout.readline() == "in\n"
-    words = rf"latest is being written by another flipproof \(process {first.pid}\); wait for it"
-    with pytest.raises(OutputError, match=words), replaced_folder(target, "report"):
-        pass
-    assert (tmp_path / f"latest{UNFINISHED}" / "new").is_dir()
+    refused(rf"latest is being written by another flipproof \(process {first.pid}\)", target)
+    assert (target.with_name(f"latest{UNFINISHED}") / "new").is_dir()
     first.kill()
     first.communicate()
     with replaced_folder(target, "report") as folder:
         make_report(folder, "new")
     assert read_report(target) == {"new"}
-    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
 
 
-def test_many_writers_never_write_at_once(tmp_path):
+def test_many_writers_never_write_at_once(target, tmp_path):
     """Locks are made, held, removed and refused as fast as possible; no two blocks ever overlap."""
     code = """
 import os, sys, time
@@ -205,22 +190,17 @@ while done < 30:
     except OutputError as error:
         assert "is being written by another flipproof" in str(error), error
 """
-    command = [sys.executable, "-c", code, str(tmp_path / "latest"), str(tmp_path / "inside")]
+    command = [sys.executable, "-c", code, str(target), str(tmp_path / "inside")]
     writers = [subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) for _ in range(3)]
     assert [(writer.communicate(timeout=300)[1], writer.returncode) for writer in writers] == [("", 0)] * 3
-    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
 
 
 def test_a_parent_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be written"), replaced_folder(tmp_path / "file" / "latest", "report"):
-        pass
+    refused("cannot be written", tmp_path / "file" / "latest")
 
 
 def test_a_place_where_no_folder_can_be_made_is_refused_and_not_tried_for_ever(tmp_path, monkeypatch):
-    (tmp_path / f"out{UNFINISHED}").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(OutputError, match="is a link"), replaced_folder(tmp_path / "out", "report"):
-        raise AssertionError
     made = Path.mkdir
 
     def mkdir(self, *arguments, **options):
@@ -229,16 +209,16 @@ def test_a_place_where_no_folder_can_be_made_is_refused_and_not_tried_for_ever(t
         made(self, *arguments, **options)
 
     monkeypatch.setattr(Path, "mkdir", mkdir)
-    with pytest.raises(OutputError, match="cannot be written"), replaced_folder(tmp_path / "proc", "report"):
-        raise AssertionError
+    refused("cannot be written", tmp_path / "proc")
 
 
-def test_links_are_followed_and_folders_refused(tmp_path):
-    (tmp_path / "real.csv").write_text("old")
+def test_a_file_is_written_whole_links_are_followed_and_folders_refused(tmp_path):
+    write_text(tmp_path / "real.csv", "old")
     (tmp_path / "link.csv").symlink_to(tmp_path / "real.csv")
     write_text(tmp_path / "link.csv", "new")
     assert (tmp_path / "link.csv").is_symlink()
     assert (tmp_path / "real.csv").read_text() == "new"
+    assert {p.name for p in tmp_path.iterdir()} == {"real.csv", "link.csv"}
     with pytest.raises(OutputError, match="is a folder"):
         write_text(tmp_path, "x")
     with pytest.raises(OutputError, match="cannot be written"):
@@ -270,19 +250,8 @@ def test_a_mount_point_is_refused_before_the_work(tmp_path):
             check_replaceable(place, "report")
 
 
-def test_text_files_are_written_whole(tmp_path):
-    file = tmp_path / "table.csv"
-    write_text(file, "one")
-    write_text(file, "two")
-    assert file.read_text() == "two"
-    assert [p.name for p in tmp_path.iterdir()] == ["table.csv"]
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_report_leaves_the_old_one(tmp_path, number):
-    target = tmp_path / "latest"
-    with replaced_folder(target, "report") as folder:
-        make_report(folder, "old")
+def test_an_interrupted_report_leaves_the_old_one(target, number):
     process = subprocess.Popen(
         [sys.executable, "-m", "flipproof", "report", "--quick", "--out", str(target)],
         cwd=ROOT,
@@ -294,7 +263,7 @@ def test_an_interrupted_report_leaves_the_old_one(tmp_path, number):
     )
     # The new folder appears when the work begins; a moment later it is well under way.
     deadline = time.monotonic() + 300
-    while not (tmp_path / f"latest{UNFINISHED}" / "new").exists():
+    while not (target.with_name(f"latest{UNFINISHED}") / "new").exists():
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
         time.sleep(0.05)
@@ -305,7 +274,6 @@ def test_an_interrupted_report_leaves_the_old_one(tmp_path, number):
     assert err.strip().splitlines()[-1] == "flipproof: interrupted; nothing was overwritten"
     assert "Traceback" not in err
     assert read_report(target) == {"old"}
-    assert [p.name for p in tmp_path.iterdir()] == ["latest"]
 
 
 @pytest.mark.parametrize("plant", [os.symlink, os.link])
@@ -315,26 +283,23 @@ def test_a_planted_lock_is_refused_and_what_it_leads_to_is_as_it_was(tmp_path, p
     beside = tmp_path / f"latest{UNFINISHED}"
     beside.mkdir()
     plant(victim, beside / "lock")
-    with pytest.raises(OutputError, match="lock"), replaced_folder(tmp_path / "latest", "report"):
-        pass
+    refused("lock", tmp_path / "latest")
     assert victim.read_text() == "years of work"
 
 
 def test_a_planted_unfinished_folder_is_refused(tmp_path):
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    (tmp_path / f"latest{UNFINISHED}").symlink_to(elsewhere)
-    with pytest.raises(OutputError, match="link"), replaced_folder(tmp_path / "latest", "report"):
-        pass
-    assert not list(elsewhere.iterdir())
+    (tmp_path / "elsewhere").mkdir()
+    for name, place in (("latest", "elsewhere"), ("other", "nowhere")):
+        (tmp_path / f"{name}{UNFINISHED}").symlink_to(tmp_path / place)
+        refused("is a link", tmp_path / name)
+    assert not list((tmp_path / "elsewhere").iterdir())
 
 
 def test_a_lock_in_a_folder_that_everybody_may_write_is_refused(tmp_path):
     beside = tmp_path / f"latest{UNFINISHED}"
     beside.mkdir()
     beside.chmod(0o777)
-    with pytest.raises(OutputError, match="every user"), replaced_folder(tmp_path / "latest", "report"):
-        pass
+    refused("every user", tmp_path / "latest")
 
 
 def test_a_planted_part_file_is_not_written_to(tmp_path):
@@ -353,7 +318,6 @@ def test_what_was_planted_in_an_unfinished_folder_is_neither_installed_nor_delet
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "mine.txt").write_text("mine")
-    target = tmp_path / "latest"
     place = tmp_path / f"latest{UNFINISHED}" / name
     place.parent.mkdir()
     if planted == "link":
@@ -365,8 +329,7 @@ def test_what_was_planted_in_an_unfinished_folder_is_neither_installed_nor_delet
         (place / "mine.txt").write_text("mine")
         if planted == "stranger":
             (place / MARKER).write_text(marker_text("report", ["index.html"]))
-    with pytest.raises(OutputError, match=name), replaced_folder(target, "report"):
-        pass
-    assert not target.exists()
+    refused(name, tmp_path / "latest")
+    assert not (tmp_path / "latest").exists()
     assert (elsewhere / "mine.txt").read_text() == "mine"
     assert (place if planted == "file" else place / "mine.txt").read_text() == "mine"
