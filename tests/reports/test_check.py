@@ -1,16 +1,15 @@
 """A throw held to a baseline: what passes, what fails, and what is said of the rest."""
 
-import argparse
 import json
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
 import pytest
+from made_up import action as flipproof
 
 from flipproof.chapters.errata import chapter as errata
 from flipproof.check import throw as check_module
 from flipproof.check.throw import CHECKS, check, findings_of, groups, line
-from flipproof.cli.check import add_checks
 from flipproof.frame import pool
 from flipproof.frame.findings import Finding
 from flipproof.frame.solvers import Made
@@ -19,14 +18,6 @@ from flipproof.output.summary import summary_text
 from slicemodel import Scenario
 
 THROW = Scenario(n_slices=6, drag=0.8, duration=0.2)
-
-
-def flipproof(*arguments):
-    """Run the command as the command line does."""
-    top = argparse.ArgumentParser()
-    add_checks(top.add_subparsers())
-    options = top.parse_args([str(argument) for argument in arguments])
-    return options.action(options)
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """Two reports compared: nothing between two runs of the same program, and a seeded fault by the findings it moves."""
 
-import argparse
 import copy
 import dataclasses
 import json
@@ -9,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from made_up import action as flipproof
 
 from flipproof.build import ask_of
 from flipproof.chapters import parts
@@ -18,7 +18,6 @@ from flipproof.chapters.stability.chapter import Layout
 from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
 from flipproof.check.diff_page import read_curves
 from flipproof.check.report_pair import differences, figure_report_pair
-from flipproof.cli.check import add_checks
 from flipproof.frame import pool, solvers
 from flipproof.frame.findings import Band, Finding
 from flipproof.frame.gather import evaluate, gather
@@ -74,14 +73,6 @@ def sound(made):
     return summary_of_a_run(make)
 
 
-def flipproof(*arguments):
-    """Run the commands as the command line does."""
-    top = argparse.ArgumentParser()
-    add_checks(top.add_subparsers())
-    options = top.parse_args([str(argument) for argument in arguments])
-    return options.action(options)
-
-
 def written(folder, summary):
     folder.mkdir()
     (folder / "summary.json").write_text(summary_text(summary), encoding="utf-8", errors="backslashreplace")
@@ -135,59 +126,53 @@ def finding(**changes):
     return Finding(**given | {"band": Band.of(given["band"], "twins")}).to_mapping()
 
 
-@pytest.mark.parametrize(
-    ("changes", "kind"),
-    [
-        ({}, None),
-        ({"value": 1.19}, None),
-        ({"value": 1.21}, "moved"),
-        ({"value": 0.79}, "moved"),
-        ({"value": 1.3, "band": 0.25}, None),
-        ({"value": 1.3, "band": None}, "moved"),
-        ({"value": 1.2 + 2e-6}, "moved"),
-        ({"value": 1.2 + 5e-7}, None),
-        ({"value": float("nan")}, "moved"),
-        ({"value": float("inf")}, "moved"),
-        ({"band": float("nan"), "value": 1.09}, None),
-        ({"value": None}, "verdict"),
-        ({"unit": "km"}, "moved"),
-        ({"title": "says something else"}, "words"),
-        ({"note": "took 3 s"}, None),
-        ({"kind": "regression", "admissible": (0.0, 2.0)}, "verdict"),
-    ],
-    ids=str,
-)
-def test_a_finding_differs_beyond_the_sum_of_both_bands(changes, kind):
-    change = change_of(finding(), finding(**changes))
-    assert (None if change is None else change.kind) == kind
+WITH_A_BAND = [
+    ({}, None),
+    ({"value": 1.19}, None),
+    ({"value": 1.21}, "moved"),
+    ({"value": 0.79}, "moved"),
+    ({"value": 1.3, "band": 0.25}, None),
+    ({"value": 1.3, "band": None}, "moved"),
+    ({"value": 1.2 + 2e-6}, "moved"),
+    ({"value": 1.2 + 5e-7}, None),
+    ({"value": float("nan")}, "moved"),
+    ({"value": float("inf")}, "moved"),
+    ({"band": float("nan"), "value": 1.09}, None),
+    ({"value": None}, "verdict"),
+    ({"unit": "km"}, "moved"),
+    ({"title": "says something else"}, "words"),
+    ({"note": "took 3 s"}, None),
+    ({"kind": "regression", "admissible": (0.0, 2.0)}, "verdict"),
+]
+WITHOUT_A_BAND = [
+    ({"value": 1.3}, "bandless"),
+    ({"value": 1.0 + 2e-6}, "bandless"),
+    ({"value": 1.0 + 5e-7}, None),
+    ({"value": 1.3, "band": float("nan")}, "bandless"),
+    ({"value": 1.3, "band": 0.1}, "moved"),
+    ({"value": float("nan")}, "moved"),
+    ({"value": float("inf")}, "moved"),
+    ({"value": None}, "verdict"),
+    ({"value": 1.3, "unit": "km"}, "moved"),
+    ({"value": 1.3, "title": "says something else"}, "words"),
+    ({"value": 3.0, "kind": "regression", "admissible": (0.0, 2.0)}, "verdict"),
+]
+HELD = {"band": None, "kind": "regression", "admissible": (0.0, 2.0)}
 
 
 @pytest.mark.parametrize(
-    ("changes", "kind"),
+    ("old", "changes", "kind"),
     [
-        ({"value": 1.3}, "bandless"),
-        ({"value": 1.0 + 2e-6}, "bandless"),
-        ({"value": 1.0 + 5e-7}, None),
-        ({"value": 1.3, "band": float("nan")}, "bandless"),
-        ({"value": 1.3, "band": 0.1}, "moved"),
-        ({"value": float("nan")}, "moved"),
-        ({"value": float("inf")}, "moved"),
-        ({"value": None}, "verdict"),
-        ({"value": 1.3, "unit": "km"}, "moved"),
-        ({"value": 1.3, "title": "says something else"}, "words"),
-        ({"value": 3.0, "kind": "regression", "admissible": (0.0, 2.0)}, "verdict"),
+        *(({}, *each) for each in WITH_A_BAND),
+        *(({"band": None}, *each) for each in WITHOUT_A_BAND),
+        (HELD, {"value": 1.9}, "bandless"),
+        (HELD, {"value": 2.1}, "verdict"),
     ],
     ids=str,
 )
-def test_without_a_band_a_number_that_moved_is_not_comparable(changes, kind):
-    change = change_of(finding(band=None), finding(**{"band": None, **changes}))
+def test_a_finding_differs_beyond_its_bands_and_is_not_comparable_without_one(old, changes, kind):
+    change = change_of(finding(**old), finding(**{**old, **changes}))
     assert (None if change is None else change.kind) == kind
-
-
-def test_a_verdict_that_changed_counts_without_a_band():
-    held = {"band": None, "kind": "regression", "admissible": (0.0, 2.0)}
-    assert change_of(finding(**held), finding(**held, value=1.9)).kind == "bandless"
-    assert change_of(finding(**held), finding(**held, value=2.1)).kind == "verdict"
 
 
 def test_the_tolerance_is_added_to_every_band():
@@ -218,6 +203,12 @@ def test_every_erratum_has_a_band(sound):
 
 
 # ---------------------------------------------------------------------- the page
+
+
+def page_of(tmp_path, *arguments):
+    """Return the page of a comparison that finds no difference."""
+    assert flipproof("diff", *arguments, "--html", tmp_path / "diff.html") == 0
+    return (tmp_path / "diff.html").read_text(encoding="utf-8")
 
 
 def with_curves(folder, factor=1.0, name="eq8", rows=5):
@@ -263,16 +254,13 @@ def test_the_figure_names_its_axes_with_units():
 
 def test_the_page_says_which_curves_are_missing(sound, tmp_path):
     old, new = written(tmp_path / "old", sound), with_curves(written(tmp_path / "new", sound))
-    assert flipproof("diff", old / "summary.json", new, "--html", tmp_path / "diff.html") == 0
-    page = (tmp_path / "diff.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path, old / "summary.json", new)
     assert f"The old report&#39;s curves are not shown: {old / 'figures/omega.csv'} cannot be read" in page
     assert "The new report" not in page
     with_curves(old, name="free-flight")
-    assert flipproof("diff", old, new, "--html", tmp_path / "diff.html") == 0
-    assert "In one of the reports alone: eq8, free-flight." in (tmp_path / "diff.html").read_text(encoding="utf-8")
+    assert "In one of the reports alone: eq8, free-flight." in page_of(tmp_path, old, new)
     (old / "figures" / "omega.csv").write_text("t [s],omega/omega_0 eq8 [1]\n0,fast\n")
-    assert flipproof("diff", old, new, "--html", tmp_path / "diff.html") == 0
-    assert "could not convert string to float" in (tmp_path / "diff.html").read_text(encoding="utf-8")
+    assert "could not convert string to float" in page_of(tmp_path, old, new)
 
 
 def test_curves_are_read_as_they_were_written(tmp_path):
