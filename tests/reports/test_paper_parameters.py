@@ -1,7 +1,6 @@
 """The table of the paper's parameters: what it claims about the text's silences, and the throws made from it."""
 
 import math
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -70,7 +69,8 @@ def test_a_case_is_one_throw_that_is_kept_as_every_family_needs_it():
     every = [case for members in FAMILIES.values() for case in members]
     throws = {(case.scenario, case.steps, case.slices_vary) for case in every}
     assert {(case.scenario, case.steps, case.slices_vary) for case in all_cases().values()} == throws
-    assert len(all_cases()) == len(throws)
+    assert len(all_cases()) == len(throws) == len({case.key for case in every})
+    assert len({(case.key, case.scenario, case.steps) for case in every}) == len(throws)
     for key, case in all_cases().items():
         assert case.whole == any(each.whole for each in every if each.key == key)
         assert (case.steps - 1) % case.thin == 0
@@ -136,13 +136,7 @@ def test_the_throw_is_the_default_one():
         assert case.scenario.fill_fraction == pytest.approx(case.value)
 
 
-def test_a_key_names_one_throw_and_one_throw_of_a_kind_has_one_key():
-    throws = {}
-    for members in FAMILIES.values():
-        for case in members:
-            assert throws.setdefault(case.key, (case.scenario, case.steps)) == (case.scenario, case.steps)
-    kinds = Counter((case.scenario, case.steps, case.slices_vary) for case in all_cases().values())
-    assert max(kinds.values()) == 1
+def test_the_half_full_bottle_is_in_every_family_that_it_belongs_to():
     for name in ("filling", "drag", "spin", "angle", "aspect", "steps 0.5"):
         assert HALF_FULL in {case.key for case in family(name)}, name
 

@@ -107,10 +107,8 @@ def test_regressions_are_test_cases_and_observations_properties():
     assert {each.get("name") for each in suite.iter("property")} == {"difference-a-b", "limit-a"}
 
 
-def test_the_counts_are_those_of_the_elements_and_the_order_is_that_of_the_format():
+def test_the_order_of_the_elements_is_that_of_the_format():
     suite = suite_of(FINDINGS)
-    for count, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error")):
-        assert int(suite.get(count)) == len(list(suite.iter(tag)))
     assert [child.tag for child in suite] == ["properties"] + ["testcase"] * 4
     for case in suite.iter("testcase"):
         assert case.get("classname")
