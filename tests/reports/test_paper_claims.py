@@ -231,7 +231,25 @@ def of_slices(error):
     return flights_of(["slices"], lambda count: falls_to(0.3 + error(count)))
 
 
+def of_water_by_the_cap(share):
+    """Flights of every drag in which so much of the water reaches the cap's half, and nine tenths without drag."""
+    runs = {}
+    for case in family("drag"):
+        r = np.full((2, 10), 0.2)
+        r[1, : round(10 * (0.9 if case.value == 0.0 else share))] = 0.05
+        runs[case.key] = flight(case.scenario.with_slices(10), FLAT, points=2, r=r, v=np.zeros_like(r))
+    return flown(runs)
+
+
+def of_steps(low):
+    """Curves that come down to 0.3, and to another level with many steps."""
+    many = {MANY_STEPS_KEY.format(filling): flight(THROW, falls_to(low)) for filling in numbers("figure-S1-filling")}
+    return flights_of(["filling", "steps 0.5"], always(FLAT), **many)
+
+
 CASES = [
+    ("strong-drag-impedes", of_water_by_the_cap(0.4), of_water_by_the_cap(0.8)),
+    ("steps-enough", of_steps(0.301), of_steps(0.4)),
     ("few-slices", of_slices(lambda n: 1.0 / n**2), of_slices(lambda n: 0.2 if n == 10.0 else 0.1 / n)),
     ("minimum-shifts", of_slices(lambda n: 0.5 / n**1.5), of_slices(always(0.0))),
     ("beta-1-rises", of_beta(LATE, FLAT, FLAT), of_beta(FLAT, FLAT, LATE)),
@@ -283,18 +301,8 @@ def test_the_minimum_is_open_where_the_finest_cut_itself_is_not_settled():
     assert verdict_of("minimum-shifts", open_) == "cannot be decided"
 
 
-def test_strong_drag_impedes_by_where_the_water_gets():
-    def flights(share):
-        runs = {}
-        for case in family("drag"):
-            near = round(10 * (0.9 if case.value == 0.0 else share))
-            r = np.full((2, 10), 0.2)
-            r[1, :near] = 0.05
-            runs[case.key] = flight(case.scenario.with_slices(10), FLAT, points=2, r=r, v=np.zeros_like(r))
-        return flown(runs)
-
-    assert verdict_of("strong-drag-impedes", flights(0.4)) == "holds"
-    assert verdict_of("strong-drag-impedes", flights(0.8)) == "fails"
+def test_steps_are_judged_of_the_published_program_alone():
+    assert verdict_of("steps-enough", flown({}, "free-flight")) == "not judged"
 
 
 @pytest.mark.parametrize(("weight_wins", "verdict"), [(True, "holds"), (False, "fails")])
@@ -355,18 +363,6 @@ def test_a_bottle_that_never_stands_upright_leaves_the_landing_undecided():
     assert "does not reach θ = 2π" in judgement.aside
 
 
-def test_more_steps_must_not_move_the_curve():
-    def flights(low):
-        finer = {
-            MANY_STEPS_KEY.format(filling): flight(THROW, falls_to(low)) for filling in numbers("figure-S1-filling")
-        }
-        return flights_of(["filling", "steps 0.5"], always(FLAT), **finer)
-
-    assert verdict_of("steps-enough", flights(0.301)) == "holds"
-    assert verdict_of("steps-enough", flights(0.4)) == "fails"
-    assert verdict_of("steps-enough", flown({}, "free-flight")) == "not judged"
-
-
 # ---------------------------------------------------------------------- geometry and counts
 
 
@@ -379,7 +375,7 @@ def test_toppling_angle_peaks_at_45_degrees_where_the_paper_says():
     assert judge(BY_ID["toppling-peak"], flown({}, "geometry")).verdict == "holds"
 
 
-def test_water_at_rest_reaches_the_centre_of_mass_where_the_toppling_angle_peaks():
+def test_water_at_rest_reaches_the_centre_of_mass_where_the_toppling_angle_peaks(monkeypatch):
     """h/L = eps/(1 + eps) and M^2 + 2 b M - b = 0 against the scenario's own centre of mass and slices, to 1e-6."""
     bottle = paper_throw().bottle
     filling = landing.filling_of_change(bottle)
@@ -398,9 +394,6 @@ def test_water_at_rest_reaches_the_centre_of_mass_where_the_toppling_angle_peaks
     found = landing.claim_filling_of_change()
     assert (found.verdict, found.failed) == ("pass", False)
     assert found.value < 1e-6
-
-
-def test_a_wrong_filling_of_change_fails(monkeypatch):
     monkeypatch.setattr(landing, "filling_of_change", always(0.14166))
     assert landing.claim_filling_of_change().failed
 
@@ -416,6 +409,8 @@ def test_free_flight_throws_water_to_the_cap_from_that_filling_on(filling, over)
 
 
 def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
+    scale = judge(BY_ID["spin-scale"], flown({}, "geometry"))
+    assert (scale.verdict, scale.deciding.value) == ("holds", pytest.approx(math.sqrt(9.81 / 0.14)))
     judgement = judge(BY_ID["release-spin"], flown({}, "geometry"))
     assert judgement.verdict == "holds"
     assert judgement.deciding.value == pytest.approx(9.7, abs=0.05)
@@ -423,12 +418,6 @@ def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
     ((_, strict),) = judgement.others
     assert strict.verdict == "fails"
     assert strict.readings[0].admissible == pytest.approx((16.0, 25.0))
-
-
-def test_the_scale_of_spin_is_that_of_gravity_over_half_a_bottle():
-    judgement = judge(BY_ID["spin-scale"], flown({}, "geometry"))
-    assert judgement.verdict == "holds"
-    assert judgement.deciding.value == pytest.approx(math.sqrt(9.81 / 0.14))
 
 
 def test_work_of_the_programs_is_linear_in_slices_and_square_in_intervals_only_where_history_is_copied():
@@ -448,23 +437,25 @@ def test_work_of_the_programs_is_linear_in_slices_and_square_in_intervals_only_w
 
 
 def test_the_senses_of_non_monotonic_angles():
-    def turned(of_drag_):
-        return flights_of(["drag"], lambda drag: always_at(of_drag_(drag)))
+    def turned(share_of):
+        return flights_of(["drag"], lambda drag: lambda s: share_of(drag) + 0.0 * s)
 
-    def always_at(share):
-        return lambda s: share + 0.0 * s
-
-    grows = turned(lambda drag: 0.8 - 20 * drag if drag <= 0.01 else 0.2 + 20 * drag)
-    falls = turned(lambda drag: 0.8 - 20 * drag)
-    sense = "as θ(T) over α, which falls up to 0.01 and grows from 0.0125 on"
-    assert dict(judge(BY_ID["strong-drag-turns-back"], grows).others)[sense].verdict == "fails"  # 0.45 after 0.6
+    grows = turned(lambda drag: 0.8 - 20 * drag if drag <= 0.01 else 0.2 + 20 * drag)  # to 0.45, after 0.6
     jumps = turned(lambda drag: 0.8 - 20 * drag if drag <= 0.01 else 0.5 + 20 * drag)
-    assert dict(judge(BY_ID["strong-drag-turns-back"], jumps).others)[sense].verdict == "holds"
-    assert dict(judge(BY_ID["strong-drag-turns-back"], falls).others)[sense].verdict == "fails"
+    falls = turned(lambda drag: 0.8 - 20 * drag)
     back = of_drag(FLAT, FLAT, lambda s: 1.0 - 2.0 * s)
-    letter = "by the letter, as θ(t) turning back"
-    assert dict(judge(BY_ID["strong-drag-turns-back"], back).others)[letter].verdict == "holds"
-    assert dict(judge(BY_ID["strong-drag-turns-back"], falls).others)[letter].verdict == "fails"
+    sense, letter = (
+        "as θ(T) over α, which falls up to 0.01 and grows from 0.0125 on",
+        "by the letter, as θ(t) turning back",
+    )
+    for flights, read_as, verdict in (
+        (grows, sense, "fails"),
+        (jumps, sense, "holds"),
+        (falls, sense, "fails"),
+        (back, letter, "holds"),
+        (falls, letter, "fails"),
+    ):
+        assert dict(judge(BY_ID["strong-drag-turns-back"], flights).others)[read_as].verdict == verdict
 
 
 def test_the_filling_of_the_slow_down_is_interpolated():
@@ -721,15 +712,9 @@ def test_the_page_shows_every_verdict_with_word_sign_and_number(runs, read_page)
     failed = sum(j.verdict == "fails" for s, j in judged if s.kind == "claim")
     assert text.count("✗ fails") == 2 * failed + sum(other.verdict == "fails" for other in others)
     assert text.count("has this limit") == 2 * sum(s.word(j).startswith("has this limit") for s, j in judged)
-    assert text.count("A limit that the paper admits.") == 3
     assert text.count("margin ") >= len(judged)
-    assert "not its data" in text
-    lead = " ".join(text.split())
-    assert (
-        "Published program: 21 claims hold, 7 fail, 2 cannot be decided; 4 of these are marginal. It has 3 of the 3 "
-        "limits that the paper admits."
-    ) in lead
-    assert "Two explanations, between which the text does not decide." in text
+    lead = "Published program: 21 claims hold, 7 fail, 2 cannot be decided; 4 of these are marginal. It has 3 of the 3"
+    assert lead in " ".join(text.split())
     assert len(list(verdicts.findings())) == len(STEADY) + 1 + sum(len(s.judgements) for s in verdicts.statements)
     assert [finding for finding in verdicts.findings() if finding.failed] == []
     kept = json.loads(json.dumps(verdicts.to_mapping(), allow_nan=False))

@@ -7,9 +7,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from made_up import refused
+from made_up import command, refused
 
-from flipproof.cli.main import main
 from flipproof.output.scene import write_scene
 from slicemodel import Scenario
 
@@ -90,7 +89,7 @@ def test_the_scene_flies_as_the_answers_say_up_to_the_first_impact(tmp_path):
 def test_the_command_writes_the_folder_and_refuses_ice(tmp_path, capsys):
     throw = tmp_path / "throw.toml"
     throw.write_text(THROW.to_toml())
-    assert main(["scene", str(throw), "--slices", "3", "--out", str(tmp_path / "scene")]) == 0
+    assert command(capsys, "scene", throw, "--slices", "3", "--out", tmp_path / "scene")[0] == 0
     assert {path.name for path in (tmp_path / "scene").iterdir()} == {
         "scene.xml", "scene.json", "answers.csv", "readback.py",
     }  # fmt: skip
