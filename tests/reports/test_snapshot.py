@@ -40,11 +40,7 @@ def test_its_findings_are_those_that_the_code_gives_now():
 
 
 def test_its_pictures_are_there_and_the_readme_shows_one():
-    assert {path.name for path in PLACE.iterdir()} == {
-        ".flipproof",
-        "summary.json",
-        *(f"{name}.png" for name in PICTURES),
-    }
+    assert {path.name for path in PLACE.iterdir()} == KEPT_FILES
     for name in PICTURES:
         assert (PLACE / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     shown = re.findall(r"reports/snapshot/(\S+?)\.png", (ROOT / "README.md").read_text(encoding="utf-8"))
@@ -70,11 +66,7 @@ def test_one_command_keeps_summary_and_pictures(report, tmp_path, kept, capsys):
     place = tmp_path / "snapshot"
     assert main(["--from", str(report), "--to", str(place)]) == 0
     assert capsys.readouterr().out == f"Snapshot: {place}\n"
-    assert {path.name for path in place.iterdir()} == {
-        ".flipproof",
-        "summary.json",
-        *(f"{name}.png" for name in PICTURES),
-    }
+    assert {path.name for path in place.iterdir()} == KEPT_FILES
     assert json.loads((place / "summary.json").read_text(encoding="utf-8")) == kept
     assert (place / "omega.png").read_bytes() == b"\x89PNG omega"
     assert read_summary(place)

@@ -182,18 +182,18 @@ def test_errors_near_the_floor_and_saturated_ones_bend_no_slope():
     assert [point.at_floor for point in found.points] == [False, False, False, False, False, True, True]
 
 
-def test_errors_that_follow_no_law_have_no_slope_and_say_so():
-    _, found = studied([1e-2, 0.99e-2, 0.98e-2, 1e-7])
+@pytest.mark.parametrize(
+    ("errors", "reason"),
+    [([1e-2, 0.99e-2, 0.98e-2, 1e-7], "errors fall by no law of cost: "), ([1e-2, 1e-3], "2 levels")],
+)
+def test_errors_that_follow_no_law_and_too_few_levels_have_no_slope_and_say_so(errors, reason):
+    _, found = studied(errors)
     assert math.isnan(found.slope.order)
-    assert found.slope.reason.startswith("errors fall by no law of cost: ")
-    _, found = studied([1e-2, 5.2e-3, 2.4e-3, 1.3e-3])
-    assert found.slope.order == pytest.approx(1.0, abs=0.1)
+    assert reason in found.slope.reason
 
 
-def test_too_few_levels_have_no_slope_and_say_so():
-    _, found = studied([1e-2, 1e-3])
-    assert math.isnan(found.slope.order)
-    assert "2 levels" in found.slope.reason
+def test_errors_that_scatter_about_a_law_have_its_slope():
+    assert studied([1e-2, 5.2e-3, 2.4e-3, 1.3e-3])[1].slope.order == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_reference_that_agrees_to_the_last_digit_claims_no_more_than_round_off():
@@ -368,28 +368,20 @@ def test_a_timed_run_is_thinned_and_costs_something():
 def test_a_run_that_ends_early_is_thinned_up_to_there():
     whole = slicemodel.solve(BEFORE_IMPACTS, "exact-step", COMMON + 1)
     times = common_times(BEFORE_IMPACTS)
-    short = sampled(whole, times)
-    assert len(sampled(replace(short, t=short.t[:5], theta=short.theta[:5], omega=short.omega[:5],
-                               r_cm=short.r_cm[:5], inertia=short.inertia[:5]), times).t) == 5  # fmt: skip
+    kept = {name: getattr(whole, name)[:5] for name in ("t", "theta", "omega", "r_cm", "inertia", "r", "v")}
+    assert len(sampled(replace(whole, **kept), times).t) == 5
 
 
 def test_runs_come_back_and_failures_keep_their_reason():
     throw = BEFORE_IMPACTS
-    runs = [
-        (Run("eq8", throw, {"times": common_times(throw), "method": "LSODA"}, label="b"), common_times(throw)),
-        (Run("eq8", throw, {"times": common_times(throw), "method": "nobody"}, label="a"), common_times(throw)),
-        (Run("midpoint", throw, {"steps": COMMON + 1}, label="c"), common_times(throw)),
-        (
-            Run("eq8", throw, {"times": common_times(throw), "method": "LSODA", "rtol": 1e-6}, label="d"),
-            common_times(throw),
-        ),
-    ]
-    made = timed(runs)
-    assert set(made) == {run for run, _ in runs}
-    unknown = made[runs[1][0]]
-    assert unknown.trajectory is None
-    assert "nobody" in unknown.reason
-    assert made[runs[0][0]].trajectory is not None
+    times = common_times(throw)
+    methods = ({"method": "LSODA"}, {"method": "nobody"}, {"method": "LSODA", "rtol": 1e-6})
+    runs = [Run("eq8", throw, {"times": times, **method}, label=f"{k}") for k, method in enumerate(methods)]
+    runs.append(Run("midpoint", throw, {"steps": COMMON + 1}, label="scheme"))
+    made = timed([(run, times) for run in runs])
+    assert set(made) == set(runs)
+    assert [run.label for run in runs if made[run].trajectory is None] == ["1"]
+    assert "nobody" in made[runs[1]].reason
 
 
 # ---------------------------------------------------------------------- as a report shows it
