@@ -3,11 +3,10 @@
 import json
 import subprocess
 import sys
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up import alive, wait_for
 
 from flipproof.bounce import exact
 from flipproof.bounce.adapter import Adapter, AdapterError
@@ -81,22 +80,17 @@ def answered(change):
     return lambda *asked: change(*located(*asked))
 
 
-def threshold(least):
-    def drop(height, speed, restitution, gravity, dt, duration):
-        if gravity == 0 and -speed < least:
-            restitution = 0.0
-        return located(height, speed, restitution, gravity, dt, duration)
+def dead(where):
+    """Return a bouncer that does not rebound without gravity where it is told."""
+    return changed(restitution=lambda q: 0.0 if q["gravity"] == 0 and where(q) else q["restitution"])
 
-    return drop
+
+def threshold(least):
+    return dead(lambda q: -q["speed"] < least)
 
 
 def no_slow_rebound(least):
-    def drop(height, speed, restitution, gravity, dt, duration):
-        if gravity == 0 and -speed * restitution < least:
-            restitution = 0.0
-        return located(height, speed, restitution, gravity, dt, duration)
-
-    return drop
+    return dead(lambda q: -q["speed"] * q["restitution"] < least)
 
 
 def late(steps):
@@ -394,17 +388,9 @@ def test_a_program_does_not_outlive_a_killed_flipproof(tmp_path, places):
     spec = f"cmd:{sys.executable} {program}{places}"
     words = [sys.executable, "-m", "flipproof", "bounce", spec]
     flipproof = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _until(lambda: note.exists() and note.read_text().endswith("\n"))
-    lives = Path("/proc") / note.read_text().strip()
-    assert lives.exists()
+    wait_for(lambda: note.exists() and note.read_text().endswith("\n"))
+    started = int(note.read_text())
+    assert alive(started)
     flipproof.kill()
     flipproof.wait()
-    _until(lambda: not lives.exists() or "\nState:\tZ" in (lives / "status").read_text())
-
-
-def _until(condition):
-    for _ in range(3000):
-        if condition():
-            return
-        time.sleep(0.1)
-    raise AssertionError("not within five minutes")
+    wait_for(lambda: not alive(started))

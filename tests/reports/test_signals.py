@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from made_up import command
+from made_up import alive, command, wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc, and asks the kernel for a parent-death signal")
@@ -27,13 +27,6 @@ def flipproof(place, *arguments, **settings):
             yield process
         finally:
             process.kill()
-
-
-def wait_for(condition):
-    until = time.monotonic() + 300.0
-    while not condition():
-        assert time.monotonic() < until
-        time.sleep(0.05)
 
 
 def processor_seconds(process):
@@ -111,10 +104,3 @@ def test_what_a_killed_command_started_ends_too(tmp_path, text, spec):
         process.kill()
         process.wait()
     wait_for(lambda: not any(alive(pid) for pid in started))
-
-
-def alive(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
