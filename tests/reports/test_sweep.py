@@ -77,6 +77,25 @@ def copied(path, folder):
     return Path(shutil.copy(path, folder))
 
 
+def gone(*_, **__):
+    """What a worker does that died."""
+    raise OSError("gone")
+
+
+class Dying(Counting):
+    """Loses the calls whose number among all calls, or whose points, it is told."""
+
+    calls = 0
+
+    def __init__(self, lost):
+        self.lost = lost
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.calls += 1
+        future = super().submit(fn, *args, **kwargs)
+        return SerialExecutor().submit(gone) if self.lost(self.calls, args[1]) else future
+
+
 def test_every_row_is_that_of_its_single_run(swept):
     _, made, rows = swept
     assert Counter(row["status"] for row in rows).keys() == {"ok", "impossible"}
@@ -219,41 +238,19 @@ def test_what_is_no_sweep_is_left_alone(swept, tmp_path):
 def test_a_worker_that_dies_costs_its_chunk_and_a_point_that_kills_is_given_up(swept, tmp_path):
     _, made, rows = swept
 
-    class Deadly(Counting):
-        died = 0
-
-        def submit(self, fn, /, *args, **kwargs):
-            future = super().submit(fn, *args, **kwargs)
-            self.died += 1
-            if self.died != 2:
-                return future
-            return super(Counting, self).submit(lambda: (_ for _ in ()).throw(OSError("gone")))
-
-    assert filled(tmp_path / "once.sqlite", made, Deadly()) == (rows, made.size + 64, [])
+    once = Dying(lambda number, _: number == 2)
+    assert filled(tmp_path / "once.sqlite", made, once) == (rows, made.size + 64, [])
     poison = list(made.points())[70].throw
-
-    class Poisoned(SerialExecutor):
-        points = 0
-
-        def submit(self, fn, /, *args, **kwargs):
-            if any(point.throw == poison for point in args[1]):
-                return super().submit(lambda: (_ for _ in ()).throw(OSError("gone")))
-            return super().submit(fn, *args, **kwargs)
-
-    found = filled(tmp_path / "always.sqlite", made, Poisoned())[0]
+    always = Dying(lambda _, points: any(point.throw == poison for point in points))
+    found = filled(tmp_path / "always.sqlite", made, always)[0]
     assert found[70]["status"] == "worker-died"
     assert [row for k, row in enumerate(found) if k != 70] == [row for k, row in enumerate(rows) if k != 70]
 
 
 def test_workers_that_die_whatever_they_are_given_end_the_sweep(swept, tmp_path):
     _, made, _ = swept
-
-    class Dead(SerialExecutor):
-        def submit(self, *_, **__):
-            return super().submit(lambda: (_ for _ in ()).throw(OSError("gone")))
-
     with Store(tmp_path / "sweep.sqlite") as store, pytest.raises(SweepError, match="whatever they are given"):
-        fill(store, made.points(), Dead())
+        fill(store, made.points(), Dying(lambda *_: True))
 
 
 def test_a_killed_process_costs_one_chunk(swept, tmp_path):
