@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 from landing_forms import Block
-from made_up import command
+from made_up import refused
 from matplotlib.collections import QuadMesh
 
 from flipproof.build import ask_of, gather_report
@@ -574,10 +574,7 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
 )
 def test_bad_input_is_one_line_that_names_it(arguments, words, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    status, _, said = command(capsys, *arguments)
-    assert status == 2
-    assert words in said
-    assert said.count("\n") == 1
+    refused(capsys, words, *arguments)
     assert list(tmp_path.iterdir()) == []
 
 
