@@ -1,6 +1,5 @@
 """The paper's figures: each is there, drawn for three solvers, with the numbers of its flights beside it."""
 
-import argparse
 import csv
 import io
 import json
@@ -10,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import action, is_number
 
-from flipproof.cli import paper as cli_paper
 from flipproof.frame.pool import SerialExecutor
 from flipproof.output.folder import OutputError
 from flipproof.paper import figures as paper_figures
@@ -45,15 +44,7 @@ def exhibits(runs):
 def table(exhibit):
     header, *rows = csv.reader(io.StringIO(exhibit.table))
     columns = zip(header, zip(*rows, strict=True), strict=True)
-    return {name: [float(cell) if _is_number(cell) else cell for cell in cells] for name, cells in columns}
-
-
-def _is_number(cell):
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+    return {name: [float(cell) if is_number(cell) else cell for cell in cells] for name, cells in columns}
 
 
 def test_every_figure_is_there(exhibits):
@@ -192,17 +183,10 @@ def test_names_are_sorted_and_lenient_about_case():
     assert keys_of(["2b"]) == {case.key for case in family("beta at 5 /s")}
 
 
-def command(*arguments):
-    top = argparse.ArgumentParser()
-    cli_paper.add_paper(top.add_subparsers(required=True))
-    options = top.parse_args(["paper", *map(str, arguments)])
-    return options.action(options)
-
-
 @pytest.mark.parametrize("name", ["4", "10a", "", "fig7b", "7"])
 def test_an_unknown_figure_is_answered_in_one_line_with_the_list(name, tmp_path):
     with pytest.raises(ValueError, match=r"unknown; known: 2b, 3b, 5a, .*, S1c") as caught:
-        command("--figure", name, "--out", tmp_path / "out")
+        action("paper", "--figure", name, "--out", tmp_path / "out")
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "out").exists()
 
@@ -210,13 +194,13 @@ def test_an_unknown_figure_is_answered_in_one_line_with_the_list(name, tmp_path)
 def test_a_folder_with_other_files_is_refused_before_anything_flies(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(OutputError, match="and not flipproof"):
-        command("--figure", "2b", "--out", tmp_path)
+        action("paper", "--figure", "2b", "--out", tmp_path)
 
 
 def test_the_command_writes_figures_numbers_and_a_page(tmp_path, capsys, read_page):
     out = tmp_path / "figures"
     for _ in range(2):  # the second takes the place of the first
-        assert command("--figure", "2b", "--out", out, "--jobs", "1") == 0
+        assert action("paper", "--figure", "2b", "--out", out, "--jobs", "1") == 0
     told = capsys.readouterr().out
     assert "1 figure from 9 flights: " in told
     names = {file.name for file in out.iterdir()}
