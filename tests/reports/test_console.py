@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from made_up import command, refused
+from made_up import command
 
 from flipproof.cli import console
 from flipproof.cli import main as cli
@@ -18,6 +18,14 @@ from flipproof.cli.console import readable, speak_plainly
 
 ROOT = Path(__file__).resolve().parents[2]
 SNAPSHOT = ROOT / "reports" / "snapshot" / "summary.json"
+
+
+def flipproof(place, *arguments, encoding="ascii", **settings):
+    return subprocess.run(
+        [sys.executable, "-m", "flipproof", *map(str, arguments)],
+        cwd=place, env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": encoding}, capture_output=True,
+        text=True, encoding="utf-8", errors="replace", timeout=300, check=False, **settings,
+    )  # fmt: skip
 
 
 def test_every_letter_of_ours_has_an_ascii_form(monkeypatch):
@@ -39,17 +47,7 @@ def test_no_letter_of_the_sources_becomes_a_question_mark():
     assert unknown <= {"\ufffd"}
 
 
-@pytest.fixture
-def place(tmp_path):
-    """Return a folder with a throw, and the snapshot's summary with every claim failed."""
-    (tmp_path / "throw.toml").write_text("[scenario]\nn_slices = 4\n", encoding="utf-8")
-    text = SNAPSHOT.read_text(encoding="utf-8").replace('"verdict": "pass"', '"verdict": "fail"')
-    (tmp_path / "changed.json").write_text(text, encoding="utf-8")
-    return tmp_path
-
-
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
-@pytest.mark.parametrize(
+COMMANDS = pytest.mark.parametrize(
     ("status", "arguments"),
     [
         (0, ["--help"]),
@@ -63,10 +61,29 @@ def place(tmp_path):
     ],
     ids=lambda value: str(value[0]) if isinstance(value, list) else str(value),
 )
-def test_a_command_ends_with_its_own_status_on_a_poor_console(place, monkeypatch, status, arguments, encoding):
+
+
+@pytest.fixture
+def place(tmp_path):
+    """Return a folder with a throw, and the snapshot's summary with every claim failed."""
+    (tmp_path / "throw.toml").write_text("[scenario]\nn_slices = 4\n", encoding="utf-8")
+    text = SNAPSHOT.read_text(encoding="utf-8").replace('"verdict": "pass"', '"verdict": "fail"')
+    (tmp_path / "changed.json").write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+@COMMANDS
+def test_a_command_ends_with_its_own_status_on_a_poor_console(place, status, arguments):
+    told = flipproof(place, *arguments, encoding="ascii")
+    assert told.returncode == status, told.stderr
+    assert "Traceback" not in told.stderr
+
+
+@COMMANDS
+def test_it_does_so_on_a_console_of_another_encoding(place, monkeypatch, status, arguments):
     """In this process: what ends a program on such a console is what it writes."""
     monkeypatch.chdir(place)
-    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding=encoding) for name in ("stdout", "stderr")}
+    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding="cp1252") for name in ("stdout", "stderr")}
     for name, stream in streams.items():
         monkeypatch.setattr(sys, name, stream)
     try:
@@ -75,7 +92,7 @@ def test_a_command_ends_with_its_own_status_on_a_poor_console(place, monkeypatch
         ended = left.code
     for stream in streams.values():
         stream.flush()
-    said = streams["stderr"].buffer.getvalue().decode(encoding)
+    said = streams["stderr"].buffer.getvalue().decode("cp1252")
     assert ended == status, said
     assert "Traceback" not in said
 
@@ -98,7 +115,10 @@ def test_an_error_of_flipproofs_own_has_its_own_status(monkeypatch, capsys):
 def test_a_missing_engine_is_not_flipproofs_error(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     monkeypatch.delitem(sys.modules, "engine_check.engine_mujoco", raising=False)
-    refused(capsys, 'engine = "mujoco" needs MuJoCo', "simulate", "--solver", "mujoco", "--slices", "2")
+    assert cli.main(["simulate", "--solver", "mujoco", "--slices", "2"]) == 2
+    assert capsys.readouterr().err == (
+        'flipproof: error: engine = "mujoco" needs MuJoCo: pip install "flipproof[mujoco]"\n'
+    )
 
 
 def test_an_error_message_is_never_endless():
@@ -114,6 +134,7 @@ def test_what_is_echoed_is_cut(capsys):
     for arguments in (["simulate", "--steps", "9" * 5000 + "x"], ["simulate", "--solver", "z" * 50_000]):
         status, _, said = command(capsys, *arguments)
         assert status == 2
+        assert said.startswith("flipproof: error: ")
         assert len(said) < 1500
 
 
