@@ -105,8 +105,8 @@ FAULTS = (
      "test_sweep.py"),
     ("reports/flipproof/check/diff.py", "return sum(_bands(*findings))",
      "return max(_bands(*findings), default=0.0)", "test_diff.py"),
-    ("reports/flipproof/foreign/checks_measured.py", "holds=orders[worst] >= declared - ORDER_ROOM",
-     "holds=orders[worst] <= declared + ORDER_ROOM", "foreign/test_certify.py"),
+    ("reports/flipproof/foreign/checks_measured.py", "holds, advice = orders[worst] >= declared - ORDER_ROOM",
+     "holds, advice = orders[worst] <= declared + ORDER_ROOM", "foreign/test_certify.py"),
     ("reports/flipproof/frame/twins.py", '{"twin": k}', '{"twin": 1}', "test_waterfall.py"),
     ("reports/flipproof/frame/keys.py", '"settings": dict(run.settings)}', '"settings": {}}', "test_run_store.py"),
 )  # fmt: skip
