@@ -117,7 +117,8 @@ def rough(spoiled: int, noise: int, slices: int) -> None:
         except Exception:
             outcome["TRACEBACK"] += 1
             traceback.print_exc()
-    print(dict(outcome))
+        if (k + 1) % 50 == 0 or k + 1 == spoiled + noise:
+            print(f"{k + 1} of {spoiled + noise}:", dict(outcome), flush=True)
 
 
 def widths(films: int, first: int, slices: int) -> None:
