@@ -138,6 +138,11 @@ def test_the_defaults_are_those_whose_reasons_are_written_down():
     }
 
 
+def test_importing_the_package_loads_no_array_and_no_engine():
+    code = "import sys, engine_check; sys.exit(any(name in sys.modules for name in ('pymunk', 'mujoco', 'numpy')))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
 def test_asking_for_the_verb_loads_no_engine():
     code = "import sys; from engine_check import solve, PymunkKnobs; print(*sys.modules)"
     told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True).stdout
