@@ -190,6 +190,8 @@ class Likelihood:
         self.index = {name: k for k, name in enumerate(self.names)}
         self.log_bad = float(np.log(BAD / self.area))
         self.expected, self.stiffness = self._priors()
+        placed = LOOSE if self.two else LOOSE[:3]
+        self.loose = np.diag(np.pad(placed**-2.0, (0, len(self.names) - len(placed))))
         # Ten that place the flight and three accelerations of a hand; its other motions follow their priors.
         fixed = [held.release is not None, self.two and held.tilt, self.two and held.scale]
         self.degrees = (13 if self.two else 3) - sum(fixed)
@@ -332,9 +334,7 @@ class Likelihood:
             x, (cost, gradient, hessian), damping = trial, new, max(damping / 5, 1e-9)
             if gain < 1e-3:
                 break
-        loose = np.zeros(len(x))
-        loose[: 10 if self.two else 3] = LOOSE[: 10 if self.two else 3] ** -2.0
-        _, size = np.linalg.slogdet(hessian + np.diag(loose))
+        _, size = np.linalg.slogdet(hessian + self.loose)
         evidence = -cost - self.degrees * x[self.index["log_noise"]] - 0.5 * size + 0.5 * len(x) * np.log(2 * np.pi)
         if self.count > 1:  # priors that differ by kind, with their norm
             evidence += 0.5 * np.log(self.stiffness[kind, RELEASED]).sum()

@@ -22,6 +22,9 @@ THROW: Final = replace(Scenario(), duration=0.3).with_slices(4)
 SMOOTH: Final = replace(THROW, duration=0.05)
 """The same up to before any equation of the ladder has its first impact."""
 
+CALM: Final[Mapping[str, Scenario]] = {"weight": replace(SMOOTH, gravity=0.0), "drag": replace(SMOOTH, drag=0.0)}
+"""The same without one of what acts before an impact."""
+
 
 class NotApplicableError(Exception):
     """A check cannot be made of this solver; the message says what is missing."""

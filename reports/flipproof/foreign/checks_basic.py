@@ -11,7 +11,7 @@ import numpy as np
 
 from flipproof.foreign import elsewhere
 from flipproof.foreign.causes import parts_of_inertia
-from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift, when
+from flipproof.foreign.checking import CALM, SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift, when
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
@@ -221,13 +221,12 @@ def _of_outputs(traits: Traits, few: Answer, often: FloatArray) -> elsewhere.Ask
         equation = name_of(switches_of(traits.equation or ""))
     except ValueError:
         return ""
-    simpler = {"weight": replace(SMOOTH, gravity=0.0), "drag": replace(SMOOTH, drag=0.0)}
     right = curve(equation, SMOOTH, few.t).omega
     far, near = (float(np.max(np.abs(omega - right))) for omega in (few.omega, often))
     if far < 4 * near:
         return ""
-    answers = yield [replace(ask_of(traits, throw), times=few.t) for throw in simpler.values()]
-    for (name, throw), answer in zip(simpler.items(), answers, strict=True):
+    answers = yield [replace(ask_of(traits, throw), times=few.t) for throw in CALM.values()]
+    for (name, throw), answer in zip(CALM.items(), answers, strict=True):
         if np.max(np.abs(answer.omega - curve(equation, throw, few.t).omega)) < far / 10:
             return f"right where outputs lie close, and {elsewhere.right_without(name)}"
     return "right where outputs lie close: look at what goes on between two of them, such as J, omega and theta; "

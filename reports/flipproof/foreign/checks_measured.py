@@ -12,7 +12,7 @@ import numpy as np
 
 from flipproof.curves.order import observed_order
 from flipproof.foreign import departures, elsewhere
-from flipproof.foreign.checking import SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
+from flipproof.foreign.checking import CALM, SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.place import curve, name_of, placing, switches_of
 from slicemodel import Scenario
@@ -155,7 +155,7 @@ def check_order_before(traits: Traits) -> Making:
     worst = min(orders, key=lambda name: orders[name])
     holds, advice = orders[worst] >= declared - ORDER_ROOM, ""
     if not holds:
-        for name, throw in {"weight": replace(SMOOTH, gravity=0.0), "drag": replace(SMOOTH, drag=0.0)}.items():
+        for name, throw in CALM.items():
             without, _ = yield from _orders_before(traits, throw, levels)
             if without and min(without.values()) >= declared - ORDER_ROOM:
                 advice = f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}"

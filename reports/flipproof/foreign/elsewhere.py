@@ -611,7 +611,7 @@ def bisected(
         if alone.wrong:
             return (
                 f"{ice}right at {said(PAPER, name)}, wrong at {said(knobs, name)}: {_wrong_words(alone)}",
-                together or _impact_advice(alone) + (_field_advice(alone, ice=knobs.frozen) or WORDS[name][1]),
+                (together or _impact_advice(alone)) + (_field_advice(alone, ice=knobs.frozen) or WORDS[name][1]),
             )
     backs = yield from how([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
     again = [name for name, back in zip(names, backs, strict=True) if not back.wrong and back.share > 0.3]
