@@ -195,9 +195,17 @@ Where the tube recoils, rounding decides whether a solver answers these hits tog
 """
 
 SMALL: Final = replace(
-    PAPER, mass=3e-4, length=0.012, radius=0.004, capacity=6e-4, filling=0.3, slices=9, start="permuted",
-    omega0=-40.0, gravity=2.0,
-)  # fmt: skip
+    PAPER,
+    mass=3e-4,
+    length=0.012,
+    radius=0.004,
+    capacity=6e-4,
+    filling=0.3,
+    slices=9,
+    start="permuted",
+    omega0=-40.0,
+    gravity=2.0,
+)
 """A bottle of 12 mm with slices of 0.4 mm: a length, mass or drag coefficient that is cut off shows here."""
 
 SLOW: Final = replace(PAPER, slices=5, start="scattered", omega0=0.45, gravity=0.005, damping=0.05, angle=6.0)
