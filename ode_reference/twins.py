@@ -22,7 +22,7 @@ from typing import Final
 
 import numpy as np
 
-from slicemodel.scenario import LEAST, MOST, Scenario
+from slicemodel.scenario import MAX_VALUE, MIN_VALUE, Scenario
 from slicemodel.trajectory import FloatArray
 
 CHANGE: Final = 3e-11
@@ -53,4 +53,4 @@ def twin_of(scenario: Scenario, number: int) -> tuple[Scenario, FloatArray]:
 def _changed(value: float, sign: float) -> float:
     """Return a value changed by its last digits, the other way where it would leave what a scenario admits."""
     changed = value * (1.0 + CHANGE * sign)
-    return changed if LEAST <= abs(changed) <= MOST else value * (1.0 - CHANGE * sign)
+    return changed if MIN_VALUE <= abs(changed) <= MAX_VALUE else value * (1.0 - CHANGE * sign)

@@ -113,9 +113,9 @@ def cache_of_sources(function: Callable[..., Any], elsewhere: tuple[Path, ...]) 
 
 def stamp_of_sources(function: Callable[..., Any], elsewhere: tuple[Path, ...] = ()) -> str:
     """Return a hash of all sources in the folder of a function, of this file, and of those ``elsewhere``."""
-    own = Path(function.__code__.co_filename)
+    source = Path(function.__code__.co_filename)
     digest = sha256()
-    for file in [own, *sorted(own.parent.glob("*.py")), Path(__file__), *elsewhere]:
+    for file in [source, *sorted(source.parent.glob("*.py")), Path(__file__), *elsewhere]:
         content = file.read_bytes()
         digest.update(f"{file.name} {len(content)}\n".encode() + content)
     return digest.hexdigest()

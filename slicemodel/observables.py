@@ -82,9 +82,9 @@ def plateau(t: ArrayLike, omega: ArrayLike, omega0: float) -> float:
     """
     times, values = np.asarray(t, dtype=np.float64), np.asarray(omega, dtype=np.float64)
     middle = (times[0] + times[-1]) / 2
-    late = int(np.searchsorted(times, middle, side="right"))
-    grid = np.concatenate(([middle], times[late:]))
-    curve = np.concatenate(([np.interp(middle, times, values)], values[late:]))
+    start = int(np.searchsorted(times, middle, side="right"))
+    grid = np.concatenate(([middle], times[start:]))
+    curve = np.concatenate(([np.interp(middle, times, values)], values[start:]))
     return float(np.trapezoid(curve, grid) / (grid[-1] - grid[0]) / omega0)
 
 
@@ -169,8 +169,8 @@ def _integral(times: FloatArray, values: FloatArray, until: FloatArray) -> Float
     """Return the integral of the polygon through the points from times[0] to each of ``until``."""
     areas = np.concatenate(([0.0], np.cumsum(np.diff(times) * (values[1:] + values[:-1]) / 2)))
     before = np.clip(np.searchsorted(times, until, side="right") - 1, 0, len(times) - 1)
-    rest = until - times[before]
-    return np.asarray(areas[before] + rest * (values[before] + np.interp(until, times, values)) / 2)
+    remainder = until - times[before]
+    return np.asarray(areas[before] + remainder * (values[before] + np.interp(until, times, values)) / 2)
 
 
 def centre_of_mass_at_rest(scenario: Scenario) -> float:

@@ -52,8 +52,8 @@ MAX_SLICES = 10_000_000
 """Slices of a throw at the most; the paper uses 500."""
 
 
-LEAST = 1e-15
-MOST = 1e15
+MIN_VALUE = 1e-15
+MAX_VALUE = 1e15
 """Least and largest positive number of a field, in its unit: between them no product of fields leaves the range of
 floating point."""
 
@@ -84,13 +84,13 @@ class _Checks:
         value: object,
         unit: str,
         *,
-        least: float,
-        most: float,
+        minimum: float,
+        maximum: float,
     ) -> float | None:
         """Return ``value`` as float if it is a finite number in range, else note why not."""
         # A float first: asking ``numbers.Real`` takes longer than the rest of the check.
         if not isinstance(value, float) and (isinstance(value, bool) or not isinstance(value, numbers.Real)):
-            admissible = f"[{least:g}, {most:g}] {unit}".rstrip()
+            admissible = f"[{minimum:g}, {maximum:g}] {unit}".rstrip()
             self.problems.append(f"{self.where}{name} = {shown(value)} is not a number (admissible: {admissible})")
             return None
         try:
@@ -98,15 +98,15 @@ class _Checks:
         except OverflowError:
             number = math.inf
         # Written as "not inside", because NaN passes every "outside" test.
-        if not least <= number <= most:
+        if not minimum <= number <= maximum:
             given = f"{self.where}{name} = {number!r} {unit}".rstrip()
-            self.problems.append(f"{given} is outside [{least:g}, {most:g}]")
+            self.problems.append(f"{given} is outside [{minimum:g}, {maximum:g}]")
             return None
         return number
 
-    def whole(self, name: str, value: object, *, least: int, most: int) -> int | None:
-        """Return ``value`` as int if it is a whole number in [least, most]."""
-        problem = not_whole(f"{self.where}{name}", value, least, most)
+    def whole(self, name: str, value: object, *, minimum: int, maximum: int) -> int | None:
+        """Return ``value`` as int if it is a whole number in [minimum, maximum]."""
+        problem = not_whole(f"{self.where}{name}", value, minimum, maximum)
         if problem:
             self.problems.append(problem)
             return None
@@ -118,22 +118,22 @@ class _Checks:
             raise ScenarioError("; ".join(self.problems))
 
 
-def shortened(text: str, most: int) -> str:
-    """Return a text on one line of at most ``most`` characters, cut between two words and ended by " ..." if it is.
+def shortened(text: str, width: int) -> str:
+    """Return a text on one line of at most ``width`` characters, cut between two words and ended by " ..." if it is.
 
     A single word that is longer than that, such as a number of a thousand digits, is cut inside.
     """
     line = " ".join(text.split())
-    if len(line) <= most:
+    if len(line) <= width:
         return line
-    short = textwrap.shorten(line, most, placeholder=" ...", break_on_hyphens=False)
-    return short if short != "..." else line[: most - 3] + "..."
+    short = textwrap.shorten(line, width, placeholder=" ...", break_on_hyphens=False)
+    return short if short != "..." else line[: width - 3] + "..."
 
 
-def not_whole(name: str, value: object, least: int, most: int) -> str:
-    """Return what is wrong with ``value`` as a whole number in [least, most], or an empty string."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not least <= int(value) <= most:
-        return f"{name} = {shown(value)} is not a whole number in [{least}, {most}]"
+def not_whole(name: str, value: object, minimum: int, maximum: int) -> str:
+    """Return what is wrong with ``value`` as a whole number in [minimum, maximum], or an empty string."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not minimum <= int(value) <= maximum:
+        return f"{name} = {shown(value)} is not a whole number in [{minimum}, {maximum}]"
     return ""
 
 
@@ -148,8 +148,8 @@ class UnsuitableFileError(ValueError):
     """What is at a path is no file of reasonable size; the message says what it is."""
 
 
-def read_text(path: Path, most: int) -> str:
-    """Return the UTF-8 text of a regular file of at most ``most`` bytes, or of what this program has open already.
+def read_text(path: Path, max_bytes: int) -> str:
+    """Return the UTF-8 text of a regular file of at most ``max_bytes`` bytes, or of what this program has open already.
 
     A path such as /dev/stdin names an open descriptor, so that a shell may feed a pipe.
 
@@ -164,17 +164,17 @@ def read_text(path: Path, most: int) -> str:
     """
     refuse_devices(path)
     with path.open("rb") as file:
-        content = file.read(most + 1)
-    if len(content) > most:
-        largest = f"{most / 2**10:g} KiB" if most < 2**20 else f"{most / 2**20:g} MiB"
+        content = file.read(max_bytes + 1)
+    if len(content) > max_bytes:
+        largest = f"{max_bytes / 2**10:g} KiB" if max_bytes < 2**20 else f"{max_bytes / 2**20:g} MiB"
         raise UnsuitableFileError(f"is larger than {largest}, the most that is read of such a file")
     return content.decode("utf-8")
 
 
-def read_toml(path: str | PathLike[str], most: int) -> tuple[dict[str, Any], str]:
-    """Return the tables of a TOML file of at most ``most`` bytes, and its text; a ScenarioError names the file."""
+def read_toml(path: str | PathLike[str], max_bytes: int) -> tuple[dict[str, Any], str]:
+    """Return the tables of a TOML file of at most ``max_bytes`` bytes, and its text; a ScenarioError names the file."""
     try:
-        text = read_text(Path(path), most)
+        text = read_text(Path(path), max_bytes)
         return tomllib.loads(text), text
     except UnsuitableFileError as error:
         raise ScenarioError(f"{path}: {error}") from None
@@ -229,7 +229,9 @@ class Bottle:
     def __post_init__(self) -> None:
         checks = _Checks("bottle.")
         for name, unit in (("length", "m"), ("radius", "m"), ("mass", "kg"), ("capacity", "kg")):
-            object.__setattr__(self, name, checks.number(name, getattr(self, name), unit, least=LEAST, most=MOST))
+            object.__setattr__(
+                self, name, checks.number(name, getattr(self, name), unit, minimum=MIN_VALUE, maximum=MAX_VALUE)
+            )
         checks.refuse()
 
 
@@ -287,18 +289,18 @@ class Scenario:
             raise ScenarioError(f"bottle = {shown(self.bottle)} is not a Bottle")
         checked: dict[str, object] = {
             "water_mass": self._checked_water_mass(checks),
-            "n_slices": checks.whole("n_slices", self.n_slices, least=1, most=MAX_SLICES),
-            "drag": checks.number("drag", self.drag, "kg/s", least=0.0, most=MOST),
-            "restitution": checks.number("restitution", self.restitution, "", least=0.0, most=1.0),
-            "omega0": checks.number("omega0", self.omega0, "rad/s", least=-MOST, most=MOST),
+            "n_slices": checks.whole("n_slices", self.n_slices, minimum=1, maximum=MAX_SLICES),
+            "drag": checks.number("drag", self.drag, "kg/s", minimum=0.0, maximum=MAX_VALUE),
+            "restitution": checks.number("restitution", self.restitution, "", minimum=0.0, maximum=1.0),
+            "omega0": checks.number("omega0", self.omega0, "rad/s", minimum=-MAX_VALUE, maximum=MAX_VALUE),
             "theta0": self._checked_angle(checks),
-            "duration": checks.number("duration", self.duration, "s", least=LEAST, most=MOST),
-            "gravity": checks.number("gravity", self.gravity, "m/s^2", least=0.0, most=MOST),
+            "duration": checks.number("duration", self.duration, "s", minimum=MIN_VALUE, maximum=MAX_VALUE),
+            "gravity": checks.number("gravity", self.gravity, "m/s^2", minimum=0.0, maximum=MAX_VALUE),
             "launch_velocity": self._checked_launch_velocity(checks),
         }
-        if isinstance(omega0 := checked["omega0"], float) and abs(omega0) < LEAST:
+        if isinstance(omega0 := checked["omega0"], float) and abs(omega0) < MIN_VALUE:
             checks.problems.append(
-                f"omega0 = {omega0!r} rad/s does not spin (its magnitude must be in [{LEAST:g}, {MOST:g}])"
+                f"omega0 = {omega0!r} rad/s does not spin (its magnitude must be in [{MIN_VALUE:g}, {MAX_VALUE:g}])"
             )
         if not isinstance(self.frozen, bool):
             checks.problems.append(f"frozen = {shown(self.frozen)} is neither true nor false")
@@ -307,17 +309,17 @@ class Scenario:
             object.__setattr__(self, name, value)
 
     def _checked_water_mass(self, checks: _Checks) -> float | None:
-        water_mass = checks.number("water_mass", self.water_mass, "kg", least=LEAST, most=MOST)
+        water_mass = checks.number("water_mass", self.water_mass, "kg", minimum=MIN_VALUE, maximum=MAX_VALUE)
         capacity = self.bottle.capacity
         if water_mass is not None and water_mass > capacity:
             checks.problems.append(
                 f"water_mass = {water_mass!r} kg exceeds the bottle's capacity {capacity!r} kg "
-                f"(admissible: [{LEAST:g}, {capacity:g}] kg)"
+                f"(admissible: [{MIN_VALUE:g}, {capacity:g}] kg)"
             )
         return water_mass
 
     def _checked_angle(self, checks: _Checks) -> float | None:
-        angle = checks.number("theta0", self.theta0, "rad", least=-MAX_ANGLE, most=MAX_ANGLE)
+        angle = checks.number("theta0", self.theta0, "rad", minimum=-MAX_ANGLE, maximum=MAX_ANGLE)
         if angle is None and isinstance(self.theta0, int | float) and MAX_ANGLE < abs(self.theta0) <= 1e6:
             checks.problems[-1] += f"; radians? {self.theta0:g} degrees are {math.radians(self.theta0):.6g} rad"
         return angle
@@ -328,7 +330,7 @@ class Scenario:
             checks.problems.append(f"launch_velocity = {shown(components)} is not a pair (v_x, v_y) of numbers in m/s")
             return ()
         return tuple(
-            checks.number(f"launch_velocity.{axis}", component, "m/s", least=-MOST, most=MOST)
+            checks.number(f"launch_velocity.{axis}", component, "m/s", minimum=-MAX_VALUE, maximum=MAX_VALUE)
             for axis, component in zip("xy", components, strict=True)
         )
 
@@ -449,21 +451,21 @@ def _toml_value(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
-def unknown_name(what: str, given: object, known: Iterable[str]) -> str:
+def unknown_name(label: str, given: object, choices: Iterable[str]) -> str:
     """Return the message for a name that is not known: the nearest one that is, or all of them.
 
-    ``what`` leads to the name, such as "scheme =" or "throw.toml: [bottle] key".
+    ``label`` leads to the name, such as "scheme =" or "throw.toml: [bottle] key".
     """
-    by_lower_case = {name.lower(): name for name in known}
+    by_lower_case = {name.lower(): name for name in choices}
     nearest = get_close_matches(str(given)[:MAX_SHOWN].lower(), by_lower_case, n=1)
     advice = (
         f"did you mean {by_lower_case[nearest[0]]!r}?" if nearest else f"known: {', '.join(by_lower_case.values())}"
     )
-    return f"{what} {shown(given)} is unknown; {advice}"
+    return f"{label} {shown(given)} is unknown; {advice}"
 
 
-def _refuse_unknown(given: Iterable[str], allowed: Iterable[str], what: str) -> None:
+def _refuse_unknown(given: Iterable[str], allowed: Iterable[str], label: str) -> None:
     allowed = list(allowed)
     for name in given:
         if name not in allowed:
-            raise ScenarioError(unknown_name(what, name, allowed))
+            raise ScenarioError(unknown_name(label, name, allowed))

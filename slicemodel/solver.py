@@ -117,7 +117,7 @@ def checked(scheme: str, steps: int, rebound: Rebound | None) -> tuple[Scheme, S
         raise ValueError(unknown_name("rebound =", rebound, get_args(Rebound)))
     chosen = SCHEMES[scheme]
     if rebound == "in-step" and not chosen.form.exact_roots:
-        able = ", ".join(name for name, other in SCHEMES.items() if other.form.exact_roots)
+        able = ", ".join(name for name, candidate in SCHEMES.items() if candidate.form.exact_roots)
         raise ValueError(f"rebound = 'in-step' needs a scheme with exact roots ({able}), not {scheme!r}")
     form = chosen.form if rebound is None else chosen.form._replace(in_step=rebound == "in-step")
     return chosen, form, int(steps)

@@ -21,7 +21,7 @@ import numpy as np
 from slicemodel.scenario import Scenario, ScenarioError, _Checks, unknown_name
 from slicemodel.trajectory import FloatArray
 
-MOST: Final = 1e15
+MAX_VALUE: Final = 1e15
 """Size of a number at the most, in SI units, as in a scenario."""
 
 OUTCOMES: Final = MappingProxyType(
@@ -76,9 +76,9 @@ class Table:
     def __post_init__(self) -> None:
         checks = _Checks("table.")
         values = {
-            "height": checks.number("height", self.height, "m", least=-MOST, most=MOST),
-            "restitution": checks.number("restitution", self.restitution, "", least=0.0, most=1.0),
-            "friction": checks.number("friction", self.friction, "", least=0.0, most=MOST),
+            "height": checks.number("height", self.height, "m", minimum=-MAX_VALUE, maximum=MAX_VALUE),
+            "restitution": checks.number("restitution", self.restitution, "", minimum=0.0, maximum=1.0),
+            "friction": checks.number("friction", self.friction, "", minimum=0.0, maximum=MAX_VALUE),
         }
         checks.refuse()
         for name, value in values.items():
@@ -119,15 +119,15 @@ class Touch:
             raise ScenarioError(f"touch.scenario = {self.scenario!r} is not a Scenario")
         checks = _Checks("touch.")
         numbers = {
-            "theta": checks.number("theta", self.theta, "rad", least=-MOST, most=MOST),
-            "omega": checks.number("omega", self.omega, "rad/s", least=-MOST, most=MOST),
-            "time": checks.number("time", self.time, "s", least=-MOST, most=MOST),
+            "theta": checks.number("theta", self.theta, "rad", minimum=-MAX_VALUE, maximum=MAX_VALUE),
+            "omega": checks.number("omega", self.omega, "rad/s", minimum=-MAX_VALUE, maximum=MAX_VALUE),
+            "time": checks.number("time", self.time, "s", minimum=-MAX_VALUE, maximum=MAX_VALUE),
             "velocity": tuple(
-                checks.number(f"velocity.{axis}", part, "m/s", least=-MOST, most=MOST)
+                checks.number(f"velocity.{axis}", part, "m/s", minimum=-MAX_VALUE, maximum=MAX_VALUE)
                 for axis, part in zip("xy", self.velocity, strict=True)
             ),
         }
-        checks.number("scenario.gravity", self.scenario.gravity, "m/s^2", least=1.0 / MOST, most=MOST)
+        checks.number("scenario.gravity", self.scenario.gravity, "m/s^2", minimum=1.0 / MAX_VALUE, maximum=MAX_VALUE)
         arrays = {name: np.array(getattr(self, name), dtype=np.float64) for name in ("r", "v")}
         n, length = self.scenario.n_slices, self.scenario.bottle.length
         for name, values in arrays.items():

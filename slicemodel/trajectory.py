@@ -314,9 +314,9 @@ def output_times(scenario: Scenario, times: ArrayLike | None, default_points: in
         raise ValueError(
             f"times = {float(values[outside][0])!r} s is outside [0, {scenario.duration:g}] s (the duration)"
         )
-    late = np.flatnonzero(~(np.diff(values) > 0))
-    if late.size:
-        k = int(late[0])
+    unordered = np.flatnonzero(~(np.diff(values) > 0))
+    if unordered.size:
+        k = int(unordered[0])
         raise ValueError(
             f"times must increase: times[{k + 1}] = {float(values[k + 1])!r} s follows {float(values[k])!r} s"
         )

@@ -103,9 +103,9 @@ def first_guess(gamma, omega, x, v, way, end):
     snap = omega * omega * force - 2.0 * gamma * jerk
     root = end * math.sqrt(max(v * v + 2.0 * force * way, 0.0))
     t = 2.0 * way / (v + root) if end * v > 0.0 else (root - v) / force
-    made = t * (v + t * (0.5 * force + t * (1.0 / 6.0 * jerk + t * (1.0 / 24.0 * snap))))
+    travelled = t * (v + t * (0.5 * force + t * (1.0 / 6.0 * jerk + t * (1.0 / 24.0 * snap))))
     speed = v + t * (force + t * (0.5 * jerk + t * (1.0 / 6.0 * snap)))
-    return t - (made - way) / speed
+    return t - (travelled - way) / speed
 
 
 @merged

@@ -79,13 +79,13 @@ def fly(form, constants, frame, y, t, record, rebounds) -> Run:
     water_share = (1.0 - constants.bottle_share) / n
     watched = Watched(np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
     # A flock of all slices, for their sums; the first step gathers another.
-    flock, many = gathered(NO_STEP, y, v, 0, watched, -math.inf, math.inf, 0.0)
+    flock, n_watched = gathered(NO_STEP, y, v, 0, watched, -math.inf, math.inf, 0.0)
     first, second, speed, offset = flock.y, flock.y_y, 0.0, water_share * flock.y
     spin, angle, moment = frame.omega0, frame.theta0, inertia_about(frame, n, first, second, offset)
     theta[0], omega[0], r_cm[0], inertia[0] = angle, spin, frame.middle + offset, moment
     momentum = moment * spin
     hits, points, escape_step, escape_slice = 0, 1, -1, -1
-    since, gather_at = NO_STEP, 1
+    flock_map, gather_at = NO_STEP, 1
 
     for k in range(1, len(t)):
         w = spin
@@ -98,17 +98,20 @@ def fly(form, constants, frame, y, t, record, rebounds) -> Run:
                 if trial and not form.midpoint:
                     continue
                 way = faded_map(form, constants, w, centre, dt, fade_minus_1, fade)
-                one = Step(way, frame.reach, w, centre, dt, t[k])
+                this_step = Step(way, frame.reach, w, centre, dt, t[k])
                 if k == gather_at:
-                    steps, low, high, horizon = room_for(form, constants, one)
-                    flock, many = gathered(since, y, v, many, watched, low, high, horizon)
-                    since, gather_at = NO_STEP, k + steps
-                after, clear = foreseen(form, flock, since, one)
+                    steps, low, high, horizon = room_for(form, constants, this_step)
+                    flock, n_watched = gathered(flock_map, y, v, n_watched, watched, low, high, horizon)
+                    flock_map, gather_at = NO_STEP, k + steps
+                after, clear = foreseen(form, flock, flock_map, this_step)
                 if not clear:
                     # Between these two lies no slice: all are watched for some steps.
-                    flock, many = gathered(since, y, v, many, watched, math.inf, -math.inf, 0.0)
+                    flock, n_watched = gathered(flock_map, y, v, n_watched, watched, math.inf, -math.inf, 0.0)
                     gather_at = k + 1 + FEWEST_STEPS
-                seen, more = step(form, constants, one, watched, many, trial, rebounds, hits), sums_of(flock, after)
+                seen, more = (
+                    step(form, constants, this_step, watched, n_watched, trial, rebounds, hits),
+                    sums_of(flock, after),
+                )
                 sums = seen[0] + more[0], seen[1] + more[1], seen[2] + more[2]
                 if trial:
                     # A step as the exact step would make it predicts the end. Means over the step are then known up to
@@ -117,10 +120,10 @@ def fly(form, constants, frame, y, t, record, rebounds) -> Run:
                     w = 0.5 * (w + momentum / inertia_about(frame, n, sums[0], sums[1], water_share * sums[0]))
                     halfway = angle + 0.5 * dt * spin
                     centre = centre_of_repulsion(form, constants, offset + 0.5 * shift, shift / dt, halfway, w)
-            since, hits = after, seen[3]
+            flock_map, hits = after, seen[3]
             first, second, speed = sums
             if not form.keeps_position and escape_step < 0:
-                for j in range(many):
+                for j in range(n_watched):
                     if abs(watched.y[j]) > frame.middle:
                         escape_step, escape_slice = k, watched.i[j]
                         break
@@ -128,7 +131,7 @@ def fly(form, constants, frame, y, t, record, rebounds) -> Run:
             r, r_dot = record.r[k], record.v[k]
             for i in range(n):
                 r[i], r_dot[i] = y[i], v[i]
-            brought_up_to_date(since, r, r_dot, many, watched)
+            brought_up_to_date(flock_map, r, r_dot, n_watched, watched)
             # At the cap r is r_min, of which L/2 - (r_max - L/2) may miss a digit.
             for i in range(n):
                 r[i] = frame.r_min if r[i] == -frame.reach else r[i] + frame.middle

@@ -91,62 +91,65 @@ def clear_of_ends(flock, way, reach, margin):
 
 
 @merged
-def room_to_turn(one):
+def room_to_turn(this_step):
     """Return how far a slice that turns inside a step may go beyond where it was before, at most v dt.
 
     It turns if v and v' = c (y - y*) + d v differ in sign: then abs(v) is at most c abs(y - y*) / d, with d > 0. That
     holds of exact roots in the short steps of a flock; ``clear_of_ends`` refuses anything else.
     """
-    return one.dt * one.way.c / one.way.d * (one.reach + abs(one.centre))
+    return this_step.dt * this_step.way.c / this_step.way.d * (this_step.reach + abs(this_step.centre))
 
 
 @merged
-def foreseen(form, flock, since, one):
+def foreseen(form, flock, flock_map, this_step):
     """Return the map of the flock after a step, and whether surely none of it meets an end in that step.
 
     A slice that does not turn in the step is between its two places; one that turns goes beyond the first.
     """
     if flock.n == 0.0:
-        return since, True
-    after = followed(since, one.way)
-    turning = not form.in_step or clear_of_ends(flock, since, one.reach, room_to_turn(one))
-    return after, turning and clear_of_ends(flock, after, one.reach, 0.0)
+        return flock_map, True
+    after = followed(flock_map, this_step.way)
+    turning = not form.in_step or clear_of_ends(flock, flock_map, this_step.reach, room_to_turn(this_step))
+    return after, turning and clear_of_ends(flock, after, this_step.reach, 0.0)
 
 
 @merged
-def room_for(form, constants, one):
+def room_for(form, constants, this_step):
     """Return for how many steps to gather a flock, and ``low``, ``high`` and ``horizon`` of what it may hold.
 
     Where slices will be is only estimated here; ``clear_of_ends`` looks after it at every step.
     """
-    k_squared = growth_rate_squared(form, constants, one.omega)
-    force = k_squared * (one.reach + abs(one.centre))
-    steps = int(min(math.sqrt(2.0 * PUSHED * one.reach / force) / one.dt, MAX_STEPS))
+    k_squared = growth_rate_squared(form, constants, this_step.omega)
+    force = k_squared * (this_step.reach + abs(this_step.centre))
+    steps = int(min(math.sqrt(2.0 * PUSHED * this_step.reach / force) / this_step.dt, MAX_STEPS))
     if steps < FEWEST_STEPS or form.cosh_sign < 0.0:
         return MAX_STEPS, math.inf, -math.inf, 0.0
-    horizon = steps * one.dt * (1.0 + CLEAR)
+    horizon = steps * this_step.dt * (1.0 + CLEAR)
     # What cosh(k horizon) is at most, and a tenth more; the centre of repulsion and omega change on the way, for which
     # some room is left. A slice at ``high`` is then carried from the centre to ``room``.
     growth = 1.0 + 0.55 * k_squared * horizon * horizon
-    room = (1.0 - SPARE) * one.reach - (room_to_turn(one) if form.in_step else 0.0)
-    low, high = one.centre - (room + one.centre) / growth, one.centre + (room - one.centre) / growth
+    room = (1.0 - SPARE) * this_step.reach - (room_to_turn(this_step) if form.in_step else 0.0)
+    low, high = (
+        this_step.centre - (room + this_step.centre) / growth,
+        this_step.centre + (room - this_step.centre) / growth,
+    )
     return steps, max(-room, low), min(room, high), horizon
 
 
 @merged
-def brought_up_to_date(since, y, v, many, watched):
+def brought_up_to_date(flock_map, y, v, n_watched, watched):
     """Write y and v of all slices as they are now over those of the last gathering: of the flock, of those watched."""
-    for k in range(len(y) if many < len(y) else 0):
-        y[k], v[k] = moved(since, y[k], v[k])
-    for j in range(many):
+    for k in range(len(y) if n_watched < len(y) else 0):
+        y[k], v[k] = moved(flock_map, y[k], v[k])
+    for j in range(n_watched):
         y[watched.i[j]], v[watched.i[j]] = watched.y[j], watched.v[j]
 
 
 @compiled
-def gathered(since, y, v, many, watched, low, high, horizon):
+def gathered(flock_map, y, v, n_watched, watched, low, high, horizon):
     """Bring all slices up to date; return a flock of those between ``low`` and ``high``, and how many are watched."""
-    brought_up_to_date(since, y, v, many, watched)
-    many = 0
+    brought_up_to_date(flock_map, y, v, n_watched, watched)
+    n_watched = 0
     s_y = s_v = s_y_y = s_y_v = s_v_v = 0.0
     for k in range(len(y)):
         y_k, v_k = y[k], v[k]
@@ -158,6 +161,6 @@ def gathered(since, y, v, many, watched, low, high, horizon):
             s_y_v += y_k * v_k
             s_v_v += v_k * v_k
         else:
-            watched.i[many], watched.y[many], watched.v[many] = k, y_k, v_k
-            many += 1
-    return Flock(float(len(y) - many), s_y, s_v, s_y_y, s_y_v, s_v_v, low, high, horizon), many
+            watched.i[n_watched], watched.y[n_watched], watched.v[n_watched] = k, y_k, v_k
+            n_watched += 1
+    return Flock(float(len(y) - n_watched), s_y, s_v, s_y_y, s_y_v, s_v_v, low, high, horizon), n_watched

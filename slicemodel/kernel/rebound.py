@@ -47,38 +47,38 @@ class Step(NamedTuple):
 
 
 @merged
-def step(form, constants, one, watched, many, trial, log, count):
+def step(form, constants, this_step, watched, n_watched, trial, log, count):
     """Move the watched slices by one step; return sums of y, y^2 and v, and the count of rebounds with those listed.
 
     A trial only predicts what the sums would be, inside the step to second order: it moves and lists nothing.
     """
     i, y, v, y_new, v_new = watched
     # The greatest distance from the middle at which a slice does not rebound: strict compares with >, else with >=.
-    limit = one.reach if form.strict and not form.in_step else np.nextafter(one.reach, 0.0)
+    limit = this_step.reach if form.strict and not form.in_step else np.nextafter(this_step.reach, 0.0)
     past = 0
-    for j in range(many):
-        y_new[j], v_new[j] = moved(one.way, y[j], v[j])
+    for j in range(n_watched):
+        y_new[j], v_new[j] = moved(this_step.way, y[j], v[j])
         past += abs(y_new[j]) > limit
-    for j in range(many if past > 0 or form.in_step else 0):
+    for j in range(n_watched if past > 0 or form.in_step else 0):
         # A slice that passes an end and comes back within the step leaves no other trace than its reversed velocity.
         # (Written with | and &, because ``or`` and ``and`` would branch at every slice.)
         if (abs(y_new[j]) > limit) | (form.in_step & (v[j] * v_new[j] < 0.0)):
-            if trial and form.in_step and not at_rest(one, y[j], v[j]):
+            if trial and form.in_step and not at_rest(this_step, y[j], v[j]):
                 # A rebound in the step throws it back e-fold the way that it would get past the end.
-                excess = max(abs(y_new[j]) - one.reach, 0.0)
+                excess = max(abs(y_new[j]) - this_step.reach, 0.0)
                 y_new[j] -= math.copysign((1.0 + constants.restitution) * excess, y_new[j])
             elif trial:
                 if form.in_step or form.keeps_position:
                     y_new[j] = y[j]
             elif form.in_step:
-                y_new[j], v_new[j], count = bounced(form, constants, one, watched, j, log, count)
+                y_new[j], v_new[j], count = bounced(form, constants, this_step, watched, j, log, count)
             else:
-                count = list_rebound(log, count, one.end, i[j], math.copysign(1.0, y_new[j]), v_new[j])
+                count = list_rebound(log, count, this_step.end, i[j], math.copysign(1.0, y_new[j]), v_new[j])
                 v_new[j] *= -constants.restitution
                 if form.keeps_position:
                     y_new[j] = y[j]
     first = second = speed = 0.0
-    for j in range(many):
+    for j in range(n_watched):
         y_j, v_j = y_new[j], v_new[j]
         first += y_j
         second += y_j * y_j
@@ -100,13 +100,13 @@ def list_rebound(log, count, time, i, end, v):
 
 
 @merged
-def at_rest(one, y, v):
+def at_rest(this_step, y, v):
     """Return whether a slice lies at the end it is pushed to."""
-    return abs(v) <= REST_SPEED and abs(y) == one.reach and y * (y - one.centre) > 0.0
+    return abs(v) <= REST_SPEED and abs(y) == this_step.reach and y * (y - this_step.centre) > 0.0
 
 
 @merged
-def bounced(form, constants, one, watched, j, log, count):
+def bounced(form, constants, this_step, watched, j, log, count):
     """Return y and v of a slice after a step in which it may hit ends, and the count of rebounds with those listed.
 
     ``y_new`` and ``v_new`` say where it would be without ends. Coefficients stay frozen over the whole step, however
@@ -115,23 +115,23 @@ def bounced(form, constants, one, watched, j, log, count):
     y, v, y_end, v_end = watched.y[j], watched.v[j], watched.y_new[j], watched.v_new[j]
     elapsed = 0.0
     for _ in range(MAX_HITS):
-        if at_rest(one, y, v):
+        if at_rest(this_step, y, v):
             return y, 0.0, count
-        x, left = y - one.centre, one.dt - elapsed
+        x, left = y - this_step.centre, this_step.dt - elapsed
         if elapsed > 0.0:
-            way = step_map(form, constants, one.omega, 0.0, left)
+            way = step_map(form, constants, this_step.omega, 0.0, left)
             y_end, v_end = y + (way.a_minus_1 * x + way.b * v), way.c * x + way.d * v
-        end, high = int(y_end > one.reach) - int(y_end < -one.reach), left
+        end, high = int(y_end > this_step.reach) - int(y_end < -this_step.reach), left
         if v * v_end < 0.0:
             # A path turns at most once: an end beyond which the slice turns is hit before.
-            turn = turning_time(constants.gamma, one.omega, x, v)
-            farthest = one.centre + moved(step_map(form, constants, one.omega, 0.0, turn), x, v)[0]
-            if abs(farthest) > one.reach and farthest * v > 0.0:
+            turn = turning_time(constants.gamma, this_step.omega, x, v)
+            farthest = this_step.centre + moved(step_map(form, constants, this_step.omega, 0.0, turn), x, v)[0]
+            if abs(farthest) > this_step.reach and farthest * v > 0.0:
                 end, high = int(math.copysign(1.0, v)), turn
         if end == 0:
             return y_end, v_end, count
-        tau, v_hit = hit(form, constants, one.omega, x, v, end * one.reach - y, end, high)
+        tau, v_hit = hit(form, constants, this_step.omega, x, v, end * this_step.reach - y, end, high)
         elapsed += tau
-        count = list_rebound(log, count, one.end - one.dt + elapsed, watched.i[j], end, v_hit)
-        y, v = end * one.reach, -constants.restitution * v_hit
+        count = list_rebound(log, count, this_step.end - this_step.dt + elapsed, watched.i[j], end, v_hit)
+        y, v = end * this_step.reach, -constants.restitution * v_hit
     return y, 0.0, count

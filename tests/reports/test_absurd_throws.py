@@ -8,20 +8,20 @@ import pytest
 from flipproof.frame.solvers import catalogue, solve
 from ode_reference.flow import layout
 from slicemodel import Bottle, Scenario
-from slicemodel.scenario import LEAST, MAX_ANGLE, MOST
+from slicemodel.scenario import MAX_ANGLE, MAX_VALUE, MIN_VALUE
 
 THROW = Scenario(n_slices=3, duration=0.05)
 TINY = 5e-324
 ENDS = {
-    **{f"bottle.{field.name}": (LEAST, MOST) for field in fields(Bottle)},
-    "water_mass": (LEAST, THROW.bottle.capacity),
-    "drag": (TINY, 1e-300, MOST),
+    **{f"bottle.{field.name}": (MIN_VALUE, MAX_VALUE) for field in fields(Bottle)},
+    "water_mass": (MIN_VALUE, THROW.bottle.capacity),
+    "drag": (TINY, 1e-300, MAX_VALUE),
     "restitution": (TINY, 1e-300, 1.0 - 2**-53),
-    "omega0": (LEAST, MOST, -LEAST, -MOST),
+    "omega0": (MIN_VALUE, MAX_VALUE, -MIN_VALUE, -MAX_VALUE),
     "theta0": (TINY, MAX_ANGLE, -MAX_ANGLE),
-    "duration": (LEAST, MOST),
-    "gravity": (TINY, 1e-300, MOST),
-    "launch_velocity": (TINY, MOST),
+    "duration": (MIN_VALUE, MAX_VALUE),
+    "gravity": (TINY, 1e-300, MAX_VALUE),
+    "launch_velocity": (TINY, MAX_VALUE),
 }
 NAMES = [name.removeprefix("bottle.") for name in ENDS]
 CASES = [(name, value) for name, values in ENDS.items() for value in values]
@@ -30,8 +30,8 @@ CASES = [(name, value) for name, values in ENDS.items() for value in values]
 TOGETHER = [
     {"omega0": 1.8e7, "theta0": MAX_ANGLE, "duration": 5e9, "gravity": 7e-6},
     {"bottle": Bottle(radius=2e11), "water_mass": 1.0},
-    {"bottle": Bottle(length=MOST, mass=MOST), "omega0": MOST, "gravity": MOST},
-    {"bottle": Bottle(capacity=LEAST), "water_mass": LEAST, "drag": MOST, "duration": MOST},
+    {"bottle": Bottle(length=MAX_VALUE, mass=MAX_VALUE), "omega0": MAX_VALUE, "gravity": MAX_VALUE},
+    {"bottle": Bottle(capacity=MIN_VALUE), "water_mass": MIN_VALUE, "drag": MAX_VALUE, "duration": MAX_VALUE},
 ]
 """Fields that are absurd together."""
 

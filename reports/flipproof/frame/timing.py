@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from flipproof.frame.solvers import Made, Missing, Run, find, make, solve
 from slicemodel import Scenario, Trajectory
-from slicemodel.scenario import LEAST
+from slicemodel.scenario import MIN_VALUE
 from slicemodel.trajectory import FloatArray
 
 SAME_TIME: Final = 1e-9
@@ -74,7 +74,7 @@ def _kind(run: Run) -> tuple[Any, ...]:
 
 def _begun(scenario: Scenario) -> Scenario:
     """Return the first fiftieth of a throw, or all of one that is as short as throws may be."""
-    return replace(scenario, duration=max(LEAST, 0.02 * scenario.duration))
+    return replace(scenario, duration=max(MIN_VALUE, 0.02 * scenario.duration))
 
 
 def _short(run: Run) -> Run:

@@ -24,7 +24,7 @@ from flipproof.chapters.landing.work import MAKER, REFERENCE, Landed, make_landi
 from flipproof.sweep.work import Point
 from ode_reference import turn
 from slicemodel import Scenario
-from slicemodel.scenario import MOST, _Checks
+from slicemodel.scenario import MAX_VALUE, _Checks
 
 FAMILIES: Final[Mapping[str, str]] = MappingProxyType({"A": "ω₀ as thrown", "B": "time of flight as thrown"})
 """Family of throws -> what all its bottles share."""
@@ -141,7 +141,7 @@ class Scatter:
     def __post_init__(self) -> None:
         checks = _Checks("scatter.")
         for name, unit in (("spin", ""), ("angle", "rad"), ("speed", "m/s")):
-            checks.number(name, getattr(self, name), unit, least=0.0, most=MOST)
+            checks.number(name, getattr(self, name), unit, minimum=0.0, maximum=MAX_VALUE)
         checks.refuse()
 
     def times(self, factor: float) -> Scatter:
