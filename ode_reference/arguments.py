@@ -13,11 +13,11 @@ from slicemodel.scenario import Scenario, unknown_name
 from slicemodel.trajectory import FloatArray
 
 
-def known_name(what: str, name: object, known: Collection[str]) -> str:
-    """Return ``name`` if it is a key of ``known``, else raise ValueError with the nearest key."""
-    if isinstance(name, str) and name in known:
+def known_name(argument: str, name: object, choices: Collection[str]) -> str:
+    """Return ``name`` if it is a key of ``choices``, else raise ValueError with the nearest key."""
+    if isinstance(name, str) and name in choices:
         return name
-    raise ValueError(unknown_name(f"{what} =", name, known))
+    raise ValueError(unknown_name(f"{argument} =", name, choices))
 
 
 def true_or_false(name: str, value: object) -> bool:
@@ -27,20 +27,20 @@ def true_or_false(name: str, value: object) -> bool:
     return bool(value)
 
 
-def number_above(name: str, value: object, above: float, most: float, unit: str = "") -> float:
-    """Return ``value`` as float if it lies in (above, most], else raise ValueError; NaN lies in no range."""
+def number_above(name: str, value: object, above: float, maximum: float, unit: str = "") -> float:
+    """Return ``value`` as float if it lies in (above, maximum], else raise ValueError; NaN lies in no range."""
     number = _finite(value)
-    if not above < number <= most:
-        raise ValueError(f"{name} = {value!r}{unit} is outside ({above:g}, {most:g}]{unit}")
+    if not above < number <= maximum:
+        raise ValueError(f"{name} = {value!r}{unit} is outside ({above:g}, {maximum:g}]{unit}")
     return number
 
 
-def number_within(name: str, value: object, least: float, most: float = math.inf, unit: str = "") -> float:
-    """Return ``value`` as float if it is finite and lies in [least, most], else raise ValueError."""
+def number_within(name: str, value: object, minimum: float, maximum: float = math.inf, unit: str = "") -> float:
+    """Return ``value`` as float if it is finite and lies in [minimum, maximum], else raise ValueError."""
     number = _finite(value)
-    if not least <= number <= most:
-        upper = f"{most:g}]" if most < math.inf else "inf)"
-        raise ValueError(f"{name} = {value!r}{unit} is outside [{least:g}, {upper}{unit}")
+    if not minimum <= number <= maximum:
+        upper = f"{maximum:g}]" if maximum < math.inf else "inf)"
+        raise ValueError(f"{name} = {value!r}{unit} is outside [{minimum:g}, {upper}{unit}")
     return number
 
 

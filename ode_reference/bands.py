@@ -56,9 +56,9 @@ class Band:
         return float(self.t[within[-1]]) if len(within) else float("nan")
 
 
-def band_of(value: ArrayLike, others: ArrayLike) -> FloatArray:
+def band_of(value: ArrayLike, variants: ArrayLike) -> FloatArray:
     """Return the band of values, shape (...), from those of the other flights, shape (K, ...)."""
-    changes = np.abs(np.asarray(others, dtype=np.float64) - np.asarray(value, dtype=np.float64))
+    changes = np.abs(np.asarray(variants, dtype=np.float64) - np.asarray(value, dtype=np.float64))
     return np.asarray(SAFETY * changes.max(axis=0))
 
 
@@ -95,20 +95,20 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
         raise ValueError(problem)
     if not len(flight.t):
         return Band(flight.t, flight.t, 0)
-    own = {name: settings[name] for name in ("method", "rtol", "atol", "max_step") if name in settings}
+    method_settings = {name: settings[name] for name in ("method", "rtol", "atol", "max_step") if name in settings}
     try:
         require_own_switches(model_named(settings["model"]), flight.scenario)
-        own = {"method": TAYLOR}
+        method_settings = {"method": TAYLOR}
     except ValueError:
         pass
-    speed, how = settings["rest_speed"], {"impact_law": settings["impact_law"], **own}
+    speed, how = settings["rest_speed"], {"impact_law": settings["impact_law"], **method_settings}
     variants = [{"twin": k, "rest_speed": speed} for k in range(1, twins + 1)]
     variants.append({"rest_speed": max(speed / CUT, MIN_REST_SPEED)})
-    if own["method"] != settings["method"]:
+    if method_settings["method"] != settings["method"]:
         variants.append({"rest_speed": speed})
     omega = np.full((len(variants), len(flight.t)), np.inf)
     for row, variant in zip(omega, variants, strict=True):
-        other = solve(flight.scenario, settings["model"], flight.t, **how, **variant).omega
-        row[: len(other)] = other
+        varied = solve(flight.scenario, settings["model"], flight.t, **how, **variant).omega
+        row[: len(varied)] = varied
     size = band_of(flight.omega, omega) / abs(flight.scenario.omega0)
     return Band(flight.t, np.maximum.accumulate(size), len(variants))

@@ -69,8 +69,8 @@ def _heavy_tube(name: str, model: str, scenario: Scenario, points: int) -> Exact
     r, v = np.empty((len(t), scenario.n_slices)), np.empty((len(t), scenario.n_slices))
     hits: Hits = []
     for i in range(scenario.n_slices):
-        pieces, own = history(model, scenario, i, rest_speed)
-        hits += own
+        pieces, slice_hits = history(model, scenario, i, rest_speed)
+        hits += slice_hits
         for p, time in enumerate(t):
             motion = [move for begins, move in pieces if begins <= time][-1]
             r[p, i], v[p, i] = motion(float(time))

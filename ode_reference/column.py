@@ -57,7 +57,7 @@ class Column:
         self.length, self.water = bottle.length, water
         self.start = scenario.fill_fraction * bottle.length
         self.reduced = water * bottle.mass / scenario.total_mass
-        self.own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+        self.tube_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
         self.mass = water / 3 - water**2 / (4 * scenario.total_mass)
         self.drag = 0.0 if scenario.frozen else scenario.n_slices * scenario.drag / 3
         self.angular_momentum = float(self.inertia(self.start)) * scenario.omega0
@@ -65,7 +65,7 @@ class Column:
 
     def inertia(self, h: Any) -> Any:
         """Return J [kg m^2] of columns of height ``h`` [m]."""
-        return self.water * h**2 / 12 + self.reduced * (self.length - h) ** 2 / 4 + self.own
+        return self.water * h**2 / 12 + self.reduced * (self.length - h) ** 2 / 4 + self.tube_inertia
 
     def growth(self, h: float) -> float:
         """Return dJ/dh [kg m]."""

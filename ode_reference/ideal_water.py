@@ -150,7 +150,7 @@ class _Fluid:
         self.ny = cells
         self.nx = round(self.length * cells / self.width)
         self.hx, self.hy = self.length / self.nx, self.width / self.ny
-        self.own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+        self.tube_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
         self.cell_mass = bottle.capacity / (self.nx * self.ny)
         depth, omega = scenario.water_mass / bottle.capacity * self.length, scenario.omega0
         across = PER_CELL * self.ny
@@ -211,10 +211,10 @@ class _Fluid:
         u, v = self.u + self.b[0], self.v + self.b[1]
         px, py = self.m @ u + self.mass * self.q[0], self.m @ v + self.mass * self.q[1]
         cx, cy = self.m @ self.x / total, self.m @ self.y / total
-        spin = self.m @ (self.x * v - self.y * u + self.spin) + self.own * self.q[2] - (cx * py - cy * px)
-        inertia = self.m @ ((self.x - cx) ** 2 + (self.y - cy) ** 2) + self.mass * (cx**2 + cy**2) + self.own
+        spin = self.m @ (self.x * v - self.y * u + self.spin) + self.tube_inertia * self.q[2] - (cx * py - cy * px)
+        inertia = self.m @ ((self.x - cx) ** 2 + (self.y - cy) ** 2) + self.mass * (cx**2 + cy**2) + self.tube_inertia
         energy = self.m @ (u**2 + v**2) + self.mass * (self.q[0] ** 2 + self.q[1] ** 2)
-        energy += self.own * self.q[2] ** 2
+        energy += self.tube_inertia * self.q[2] ** 2
         return float(spin), float(inertia), math.hypot(px, py), float(energy) / 2
 
     # ------------------------------------------------------------------ drift
@@ -245,7 +245,7 @@ class _Fluid:
             if not row.size:
                 break
             weighted = self.m[row, None] * normal
-            matrix = np.diag([self.mass, self.mass, self.own]) + weighted.T @ normal
+            matrix = np.diag([self.mass, self.mass, self.tube_inertia]) + weighted.T @ normal
             kick = np.linalg.solve(matrix, weighted.T @ speed)
             gained = normal @ kick - speed
             np.add.at(self.u, row, gained * normal[:, 0])
@@ -385,7 +385,7 @@ class _Fluid:
         w[:, 0, 2] -= hx * xc
         w[:, -1, 1] += hx
         w[:, -1, 2] += hx * xc
-        body = np.diag([self.mass, self.mass, self.own])
+        body = np.diag([self.mass, self.mass, self.tube_inertia])
         # a particle that stays on a turning wall moves along the chord: inward by bend times its place
         bend = 0.5 * self.q[2] ** 2 * dt
         chord_u, chord_v = (
@@ -467,8 +467,8 @@ def first_growth(scenario: Scenario) -> float:
     total = sum(math.tanh(2 * math.pi * n * depth / width) / n**3 for n in range(1, 2000))
     growth = bottle.capacity / (width * bottle.length) * scenario.omega0**2 * width**4 / (2 * math.pi**3) * total
     reduced = water * bottle.mass / (water + bottle.mass) * ((bottle.length - depth) / 2) ** 2
-    own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
-    return growth / (water * (depth**2 + width**2) / 12 + reduced + own)
+    tube_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+    return growth / (water * (depth**2 + width**2) / 12 + reduced + tube_inertia)
 
 
 def solve(

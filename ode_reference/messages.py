@@ -60,8 +60,8 @@ def exhausted(model: str, impacts: int, t: float) -> str:
 
 def stalled(model: str, why: str, t: float, slices: NDArray[np.int64], rest_speed: float) -> str:
     """Return that the time ceased to pass at ``t`` [s]; ``slices`` are those of the last impacts."""
-    who = ", ".join(map(str, np.unique(slices))) or "none"
+    numbers = ", ".join(map(str, np.unique(slices))) or "none"
     return (
-        f"{model}: {why.rstrip('.')} at t = {t:.9g} s; slices of the last impacts: {who}; "
+        f"{model}: {why.rstrip('.')} at t = {t:.9g} s; slices of the last impacts: {numbers}; "
         f"if they chatter, raise rest_speed (now {rest_speed:g} m/s), else check omega0, gravity and drag"
     )

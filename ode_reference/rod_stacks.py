@@ -128,13 +128,13 @@ class Stacks:
 def _place_at(stage: Stage, elapsed: float, momentum: float) -> float:
     """Return s = sqrt(C - C_1) at a time after the start of the stage."""
 
-    def late(s: float) -> float:
+    def time_error(s: float) -> float:
         return stage.time_and_angle(s, momentum)[0] - elapsed
 
     high = 1.0
-    while late(high) < 0:
+    while time_error(high) < 0:
         high *= 2
-    return float(brentq(late, 0.0, high, xtol=1e-16, rtol=1e-14))
+    return float(brentq(time_error, 0.0, high, xtol=1e-16, rtol=1e-14))
 
 
 def solve(scenario: Scenario) -> Stacks:
@@ -156,15 +156,15 @@ def solve(scenario: Scenario) -> Stacks:
     r = scenario.initial_positions()
     r_cm = (m * r.sum() + bottle.mass * bottle.length / 2) / scenario.total_mass
     starts = np.asarray(r - r_cm)
-    own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+    tube_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
     tube = bottle.length / 2 - r_cm
-    momentum = (own + bottle.mass * tube**2 + m * float(starts @ starts)) * scenario.omega0
+    momentum = (tube_inertia + bottle.mass * tube**2 + m * float(starts @ starts)) * scenario.omega0
     base, cap = 0, 0
     factor, t, theta, speed2 = 1.0, 0.0, scenario.theta0, 0.0
     stages: list[Stage] = []
     landings: list[tuple[float, int, int]] = []
     while True:
-        stage, end = _stage(scenario, starts, own, (base, cap), (factor, t, theta, speed2))
+        stage, end = _stage(scenario, starts, tube_inertia, (base, cap), (factor, t, theta, speed2))
         if end and stage.last == factor:
             # At release: the next rod lies against the stack and is pressed onto it, so that it belongs to it.
             base, cap = (base + 1, cap) if end > 0 else (base, cap + 1)
@@ -185,7 +185,7 @@ def solve(scenario: Scenario) -> Stacks:
 def _stage(
     scenario: Scenario,
     starts: FloatArray,
-    own: float,
+    tube_inertia: float,
     stuck: tuple[int, int],
     begins: tuple[float, float, float, float],
 ) -> tuple[Stage, int]:
@@ -202,7 +202,7 @@ def _stage(
         raise ValueError(f"a stack of {base} rods on the base and {cap} on the cap lets go of one at t = {t:.6g} s")
     free = starts[base : n - cap]
     recoil = -m * float(free.sum()) / body
-    j0 = own + bottle.mass * centre**2 + m * float(((offsets - centre) ** 2).sum())
+    j0 = tube_inertia + bottle.mass * centre**2 + m * float(((offsets - centre) ** 2).sum())
     j2 = m * float(free @ free) + body * recoil**2
     last, end = math.inf, 0
     if len(free):

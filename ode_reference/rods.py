@@ -98,7 +98,7 @@ class Rods:
         self.density = water / self.depth
         self.below = (water * self.depth / 2 + bottle.mass * bottle.length / 2) / self.total
         self.above = self.depth - self.below
-        self.own = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
+        self.tube_inertia = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)
         self.drag = 0.0 if scenario.frozen else scenario.n_slices * scenario.drag / water
         self.threshold = float(self.base_before_arrival(0.0))
         room = min(self.length - self.depth, self.depth - self.threshold)
@@ -133,7 +133,7 @@ class Rods:
         top, a = foot - self.length, 1.0 + grown
         cubes = foot**3 - (foot - base) ** 3 + (top + cap) ** 3 - top**3
         cubes += ((a * below + z) ** 3 + (a * above - z) ** 3) / a
-        return self.own + self.tube * (foot - self.length / 2) ** 2 + self.density * cubes / 3
+        return self.tube_inertia + self.tube * (foot - self.length / 2) ** 2 + self.density * cubes / 3
 
     def foot_speed(self, rate: Any, drift: Any, piles: Piles) -> Any:
         """Return B' [m/s] for A' and z': the momentum of the free water is that of all else, reversed."""
@@ -211,9 +211,9 @@ def solve(
     """
     rtol = number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2)
     atol = number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2)
-    moments = output_times(scenario, times)
+    t_outputs = output_times(scenario, times)
     rods = Rods(scenario)
-    states, piles, arrival = _states(scenario, rods, moments, rtol, atol)
+    states, piles, arrival = _states(scenario, rods, t_outputs, rtol, atol)
     inertia = np.asarray(rods.inertia(states[1], states[3], piles))
     r, v = rods.parts(scenario.n_slices, states, piles)
     none = np.empty(0)
@@ -221,7 +221,7 @@ def solve(
         scenario=scenario,
         solver="ode_reference",
         method=NAME,
-        t=moments,
+        t=t_outputs,
         theta=states[0],
         omega=rods.angular_momentum / inertia,
         r=r,
@@ -241,21 +241,21 @@ def solve(
 
 
 def _states(
-    scenario: Scenario, rods: Rods, moments: FloatArray, rtol: float, atol: float
+    scenario: Scenario, rods: Rods, t_outputs: FloatArray, rtol: float, atol: float
 ) -> tuple[FloatArray, Piles, float | None]:
-    """Return (theta, A - 1, A', z, z') at ``moments``, shape (5, P), the piles then, and when water is at the cap."""
+    """Return (theta, A - 1, A', z, z') at ``t_outputs``, shape (5, P), the piles then, and when water is at the cap."""
     y, t, arrival = np.array([scenario.theta0, 0.0, 0.0, 0.0, 0.0]), 0.0, None
-    states = np.tile(y[:, np.newaxis], len(moments))
-    piles = Piles(*(np.full(len(moments), length) for length in rods.at_rest))
+    states = np.tile(y[:, np.newaxis], len(t_outputs))
+    piles = Piles(*(np.full(len(t_outputs), length) for length in rods.at_rest))
     if not rods.spreads:
-        states[0] += scenario.omega0 * moments
+        states[0] += scenario.omega0 * t_outputs
         return states, piles, None
     for arrived in (False, True):
         run = _integrate(rods, (t, scenario.duration), y, arrived, rtol, atol)
         t, y = float(run.t[-1]), run.y[:, -1].copy()
-        within = (moments >= run.t[0]) & (moments <= t)
+        within = (t_outputs >= run.t[0]) & (t_outputs <= t)
         if within.any():
-            states[:, within] = run.sol(moments[within])
+            states[:, within] = run.sol(t_outputs[within])
             _fill(piles, rods.piles(states[1, within], states[3, within], arrived), within)
         path = rods.piles(run.y[1], run.y[3], arrived)
         for name, pile in (("base", path.base), ("cap", path.cap)):
@@ -265,11 +265,11 @@ def _states(
             return states, piles, arrival
         arrival = t if arrival is None else arrival
     # All water has arrived but for what no digit shows: the bottle turns as a rigid body.
-    after = moments > t
+    after = t_outputs > t
     states[:, after] = y[:, np.newaxis]
     last = rods.piles(y[1], y[3], True)
     _fill(piles, last, after)
-    states[0, after] += rods.angular_momentum / float(rods.inertia(y[1], y[3], last)) * (moments[after] - t)
+    states[0, after] += rods.angular_momentum / float(rods.inertia(y[1], y[3], last)) * (t_outputs[after] - t)
     return states, piles, arrival
 
 

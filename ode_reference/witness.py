@@ -64,7 +64,7 @@ MIN_ADVANCE: Final = 1e-7
 PARTS: Final = 4
 """Parts of one step between which a segment is looked through; a slice that turns twice within one part is not seen."""
 
-EPS, LEAST = float(np.finfo(np.float64).eps), float(np.finfo(np.float64).tiny)
+EPS, TINY = float(np.finfo(np.float64).eps), float(np.finfo(np.float64).tiny)
 
 
 def integrate(
@@ -167,11 +167,11 @@ class _Flight:
             self._meet(self.ends.touched(self.y[1 : self.n + 1]))
         while self.status == "ok" and duration - self.t > 4 * np.spacing(duration):
             if not self._overflowed():
-                self._leg()
+                self._advance()
         if self.status == "ok":
             self._record(duration, None)
 
-    def _leg(self) -> None:
+    def _advance(self) -> None:
         """Integrate up to the first event, the duration or a failure, and resolve the event."""
         watch = self._events()
         segment = self._solved([event for _, event in watch])
@@ -242,8 +242,8 @@ class _Flight:
             event.terminal, event.direction = True, 1.0 if kind == "wall" else -1.0  # type: ignore[attr-defined]
         return events
 
-    def _foremost(self, side: int, who: int | None = None) -> Event:
-        """Return what rises through zero when the first free slice, or slice ``who``, passes the end ``side``.
+    def _foremost(self, side: int, index: int | None = None) -> Event:
+        """Return what rises through zero when the first free slice, or slice ``index``, passes the end ``side``.
 
         It is the largest distance beyond that end. That of a slice that leaves the end now is divided by the time
         since; while round-off cannot tell whether such a slice has left, its velocity does.
@@ -251,14 +251,14 @@ class _Flight:
         begin, n, r, v = self.t, self.n, self.y[1 : self.n + 1], self.y[self.n + 1 :]
         near = np.abs(self.ends.beyond(side, r)) <= self.ends.reach
         leaves = np.flatnonzero(~self.motion.held & near & (side * v <= 0))
-        chosen = ~self.motion.held if who is None else np.arange(n) == who
+        chosen = ~self.motion.held if index is None else np.arange(n) == index
 
         def foremost(t: float, y: FloatArray) -> float:
             beyond = self.ends.beyond(side, y[1 : n + 1])
             if leaves.size:
                 distance, speed = beyond[leaves], side * y[n + 1 :][leaves]
                 still = (speed <= 0) & (distance <= TOUCH * self.scenario.bottle.length)
-                beyond[leaves] = np.where(still, np.minimum(speed, -LEAST), distance / max(t - begin, LEAST))
+                beyond[leaves] = np.where(still, np.minimum(speed, -TINY), distance / max(t - begin, TINY))
             return float(beyond.max(where=chosen, initial=-1.0))
 
         return foremost

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from ode_reference.flow.laws import sequential, simultaneous
-from ode_reference.flow.layout import AFTER, APPROACH, COUNT, END, NEAR, SIDE, WHO
+from ode_reference.flow.layout import AFTER, APPROACH, COUNT, END, INDEX, NEAR, SIDE
 from ode_reference.flow.ledger import book_jump, speeds_of
 from ode_reference.flow.points import count, enter, set_body, set_scales, where
 from ode_reference.flow.search import ROUNDING, STANDING
@@ -61,21 +61,21 @@ def touch(now, points, marks):
 @inner
 def pair(now, points, marks, k):
     """List the image of contact k, or give it the same approach speed."""
-    image = points.shape[1] - 1 - marks[WHO, k]
-    if marks[WHO, k] < 0 or marks[SIDE, image] != 0:
+    image = points.shape[1] - 1 - marks[INDEX, k]
+    if marks[INDEX, k] < 0 or marks[SIDE, image] != 0:
         return
     for m in range(now.hits):
-        if marks[WHO, m] == image:
+        if marks[INDEX, m] == image:
             points[APPROACH, m] = points[APPROACH, k]
             return
     add(now, points, marks, image, -points[END, k], 1, points[APPROACH, k])
 
 
 @inner
-def add(now, points, marks, who, end, slices, approach):
+def add(now, points, marks, index, end, slices, approach):
     """List one contact."""
     k = now.hits
-    marks[WHO, k], points[END, k], points[COUNT, k] = who, end, slices
+    marks[INDEX, k], points[END, k], points[COUNT, k] = index, end, slices
     points[APPROACH, k], points[AFTER, k] = approach, 0.0
     now.hits = k + 1
 
@@ -91,7 +91,7 @@ def meet(now, points, marks, impacts):
     else:
         now.dy_mean -= simultaneous(now, points, APPROACH, now.restitution)
     for k in range(now.hits):
-        j, end = marks[WHO, k], points[END, k]
+        j, end = marks[INDEX, k], points[END, k]
         if j >= 0:
             count(now, points, j, -1)
             enter(now, points, j, end * now.wall, end * points[AFTER, k])
@@ -105,20 +105,20 @@ def meet(now, points, marks, impacts):
 @inner
 def slow_on(now, points, end):
     """Return how many slices may stay on an end, which is none if it lets go; their speeds summed up; one of them."""
-    slow = total = one = 0.0
+    slow = total = speed = 0.0
     for k in range(now.hits):
         if points[END, k] == end != now.released and abs(points[AFTER, k]) < now.rest_speed:
-            one = end * points[AFTER, k]
+            speed = end * points[AFTER, k]
             slow += points[COUNT, k]
-            total += points[COUNT, k] * one
-    return slow, total, one
+            total += points[COUNT, k] * speed
+    return slow, total, speed
 
 
 @inner
 def choose(now, points, marks):
     """Set ``on_base``, ``on_cap``: who stays there; and ``shift``, what all others then lose."""
-    base, base_sum, base_one = slow_on(now, points, 1.0)
-    cap, cap_sum, cap_one = slow_on(now, points, -1.0)
+    base, base_sum, base_speed = slow_on(now, points, 1.0)
+    cap, cap_sum, cap_speed = slow_on(now, points, -1.0)
     free, everyone = now.free, now.free + now.on_base + now.on_cap
     total = speeds_of(now, points, marks)[0]
     best, stays = 0, (0, 0)
@@ -134,8 +134,8 @@ def choose(now, points, marks):
         shift = now.ratio * loose / (1.0 + now.ratio * (now.on_base + now.on_cap))
         moving = total - loose - now.free * shift
         # Who is pressed: of those that stay at no speed, of those that leave at theirs.
-        base_pressed = base > 0 and is_pressed(now, 1.0, (1 - on_base) * (base_one - shift), moving)
-        cap_pressed = cap > 0 and is_pressed(now, -1.0, (1 - on_cap) * (cap_one - shift), moving)
+        base_pressed = base > 0 and is_pressed(now, 1.0, (1 - on_base) * (base_speed - shift), moving)
+        cap_pressed = cap > 0 and is_pressed(now, -1.0, (1 - on_cap) * (cap_speed - shift), moving)
         right = base_pressed >= on_base and cap_pressed >= on_cap
         # Rounding at a group that is neither pressed nor pulled can spoil every choice in which all who leave are not.
         rank = right + (right and base_pressed == on_base and cap_pressed == on_cap)
@@ -164,7 +164,7 @@ def settle(now, points, marks, impacts):
     """Take over who stays and who leaves: speeds, moments, lists, counts, and the record of the impacts."""
     now.dy_mean -= now.shift
     for k in range(now.hits):
-        j, end, after = marks[WHO, k], points[END, k], points[AFTER, k]
+        j, end, after = marks[INDEX, k], points[END, k], points[AFTER, k]
         stays = abs(after) < now.rest_speed and (now.on_base if end > 0.0 else now.on_cap) > 0
         v = 0.0 if stays else end * after - now.shift
         if points[APPROACH, k] > 0.0:

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ode_reference.flow.layout import AFTER, APPROACH, COUNT, END, WHO
+from ode_reference.flow.layout import AFTER, APPROACH, COUNT, END, INDEX
 from slicemodel.compiled import inner
 
 TIE = 1e-9
@@ -71,7 +71,7 @@ def sequential(now, points, marks):
         if highest < now.rest_speed:
             break
         for k in range(now.hits):
-            if after[k] >= (1.0 - TIE) * highest and (first < 0 or marks[WHO, k] < marks[WHO, first]):
+            if after[k] >= (1.0 - TIE) * highest and (first < 0 or marks[INDEX, k] < marks[INDEX, first]):
                 first = k
         speed = after[first]
         step = points[END, first] * (1.0 + e) * speed * now.ratio / (1.0 + now.ratio)

@@ -70,7 +70,7 @@ PLACE, SPEED, END, COUNT, APPROACH, AFTER = range(6)
 """Rows of ``points``: (u, w) of each slice; for each contact of an instant its end, how many slices it stands for,
 their approach speed and their speed after."""
 
-SIDE, NEAR, WHO = range(3)
+SIDE, NEAR, INDEX = range(3)
 """Rows of ``marks``: the end a slice rests on, or 0; the list of watched slices; for each contact its slice, or -1 for
 all that rest on its end."""
 

@@ -23,7 +23,7 @@ import math
 
 import numpy as np
 
-from ode_reference.flow.layout import AFTER, COUNT, END, WHO
+from ode_reference.flow.layout import AFTER, COUNT, END, INDEX
 from ode_reference.flow.points import inertia_at, inertia_of
 from ode_reference.flow.series import state_at
 from slicemodel.compiled import inner
@@ -37,7 +37,7 @@ def speeds_of(now, points, marks):
     total = now.free * now.dy_mean
     squares = total * now.dy_mean + now.dA * now.dA * now.U + 2.0 * now.dA * now.dB * now.P + now.dB * now.dB * now.V
     for k in range(now.hits):
-        if marks[WHO, k] < 0:
+        if marks[INDEX, k] < 0:
             total += points[COUNT, k] * points[END, k] * points[AFTER, k]
             squares += points[COUNT, k] * points[AFTER, k] * points[AFTER, k]
     return total, squares

@@ -11,7 +11,7 @@ from ode_reference.flow.layout import EXHAUSTED, OVERFLOW, PLACE, SIDE, SPEED, S
 from ode_reference.flow.ledger import book_step, energy_of
 from ode_reference.flow.points import enter, inertia_at, inertia_of, rebase, set_body, set_scales
 from ode_reference.flow.search import find, flock_is_clear, gather
-from ode_reference.flow.series import MOST, ROWS, expand, state_at
+from ode_reference.flow.series import MAX_ORDER, ROWS, expand, state_at
 from slicemodel.compiled import inner, kept_on_disk
 
 MIN_ADVANCE = 1e-7
@@ -32,7 +32,7 @@ def fly(flight, points, marks, t_out, rows, r, v):
     r, v : array, shape (P, N) - here go y, infinite at rest, and y' [m], [m/s]; (0, N) if they are not asked for
     """
     now = flight[0]
-    impacts, table = np.empty((64, 6)), np.zeros((ROWS + 1, MOST + 1))
+    impacts, table = np.empty((64, 6)), np.zeros((ROWS + 1, MAX_ORDER + 1))
     for i in range(points.shape[1]):
         enter(now, points, i, points[PLACE, i], points[SPEED, i])
     set_body(now)

@@ -126,9 +126,9 @@ def find(now, table, points, marks):
         u, w = points[PLACE, j] - now.mu, points[SPEED, j] - now.mw
         begin = now.centre + table[Z, 0] + table[A, 0] * u + table[B, 0] * w
         gone = table[Z, 1] + table[A, 1] * u + table[B, 1] * w
-        rest = now.rest_z + now.rest_A * abs(u) + now.rest_B * abs(w) + MARGIN * now.wall
+        remainder = now.rest_z + now.rest_A * abs(u) + now.rest_B * abs(w) + MARGIN * now.wall
         for end in (1.0, -1.0):
-            if end * begin + max(end * gone, 0.0) + rest > now.wall:
+            if end * begin + max(end * gone, 0.0) + remainder > now.wall:
                 x = contact(now, table, points, j, end)
                 if x < now.root:
                     now.root, now.struck = x, j
@@ -165,10 +165,10 @@ def flock_is_clear(now, table):
     """Return whether no slice of the flock can meet an end in this step."""
     if now.near == now.free:
         return True
-    rest = now.rest_A * (now.clear + abs(now.mu)) + now.rest_B * (now.fastest + abs(now.mw)) + now.rest_z
+    remainder = now.rest_A * (now.clear + abs(now.mu)) + now.rest_B * (now.fastest + abs(now.mw)) + now.rest_z
     for x in range(2):
         a, b = table[A, 0] + x * table[A, 1], table[B, 0] + x * table[B, 1]
         middle = now.centre + table[Z, 0] + x * table[Z, 1] - a * now.mu - b * now.mw
-        if not 0.0 <= b <= a * now.span or not abs(middle) + a * now.clear + rest < (1.0 - MARGIN) * now.wall:
+        if not 0.0 <= b <= a * now.span or not abs(middle) + a * now.clear + remainder < (1.0 - MARGIN) * now.wall:
             return False
     return True

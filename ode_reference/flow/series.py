@@ -6,7 +6,7 @@ import math
 
 from slicemodel.compiled import inner
 
-MOST = 30
+MAX_ORDER = 30
 """Highest order; a step whose terms do not vanish by then is made shorter."""
 
 TRUNCATION = 1e-17
@@ -28,7 +28,7 @@ def product(table, first, second, k):
 
 @inner
 def expand(now, table, h):
-    """Fill the table with Taylor coefficients times h^k; return whether the series ends before MOST.
+    """Fill the table with Taylor coefficients times h^k; return whether the series ends before MAX_ORDER.
 
     Sets ``order``, and the sums of the magnitudes of what A, B and z have beyond the straight line.
     """
@@ -39,21 +39,21 @@ def expand(now, table, h):
     weight = now.weight if now.free > 0 else 0.0
     small, now.h = 0, h
     now.rest_A = now.rest_B = now.rest_z = 0.0
-    for k in range(MOST - 1):
-        one, p = 1.0 if k == 0 else 0.0, k + 1
+    for k in range(MAX_ORDER - 1):
+        unit, p = 1.0 if k == 0 else 0.0, k + 1
         # J, omega = L/J and k^2 = omega^2 - kappa.
         table[U_A, k] = now.U * table[A, k] + now.P * table[B, k]
         table[V_B, k] = now.P * table[A, k] + now.V * table[B, k]
         spread = product(table, A, U_A, k) + product(table, B, V_B, k)
-        table[J, k] = now.slice_mass * spread + now.reduced_mass * product(table, Z, Z, k) + one * now.body_inertia
+        table[J, k] = now.slice_mass * spread + now.reduced_mass * product(table, Z, Z, k) + unit * now.body_inertia
         table[OMEGA, k] = 0.0
-        table[OMEGA, k] = (one * now.momentum - product(table, J, OMEGA, k)) / table[J, 0]
-        table[SQUARE, k] = product(table, OMEGA, OMEGA, k) - one * now.kappa
+        table[OMEGA, k] = (unit * now.momentum - product(table, J, OMEGA, k)) / table[J, 0]
+        table[SQUARE, k] = product(table, OMEGA, OMEGA, k) - unit * now.kappa
         table[THETA, p] = h * table[OMEGA, k] / p
         # f = (1 - kappa J^2/L^2) g cos(theta), and cos(theta) by the rate of theta.
         table[FORCE, k] = table[COS, p] = table[SIN, p] = 0.0
         if now.gravity != 0.0:
-            table[SHARE, k] = one - now.kappa / now.momentum / now.momentum * product(table, J, J, k)
+            table[SHARE, k] = unit - now.kappa / now.momentum / now.momentum * product(table, J, J, k)
             table[FORCE, k] = now.gravity * product(table, SHARE, COS, k)
             for j in range(1, p + 1):
                 table[COS, p] -= j * table[THETA, j] * table[SIN, p - j] / p

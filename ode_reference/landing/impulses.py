@@ -40,7 +40,7 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
     ``sine``, ``cosine`` are of the axes; the corners are where they are at ``angle``.
     """
     m_all = world.tube + world.m * world.n
-    a12, a22 = world.m * s1, world.own + world.m * s2
+    a12, a22 = world.m * s1, world.tube_inertia + world.m * s2
     det = m_all * a22 - a12 * a12
     corners = 0
     for c in range(4):

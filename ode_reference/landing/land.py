@@ -153,11 +153,11 @@ def world_of(touch: Touch, table: Table, law: str) -> World:
     high, low = half - (i + 0.5) * rod, -half + (n - i - 0.5) * rod
     if not rigid:
         _refuse_misplaced(touch, low + half, high + half)
-    rest = bottle.mass * half + scenario.slice_mass * float((half - high).sum())
-    rest /= scenario.total_mass
-    saddle = scenario.total_mass * scenario.gravity * math.hypot(bottle.radius, rest)
+    z_rest = bottle.mass * half + scenario.slice_mass * float((half - high).sum())
+    z_rest /= scenario.total_mass
+    saddle = scenario.total_mass * scenario.gravity * math.hypot(bottle.radius, z_rest)
     # On the cap water rests as it does on the base; ice stays where it is.
-    upside_down = bottle.length - rest if scenario.frozen else rest
+    upside_down = bottle.length - z_rest if scenario.frozen else z_rest
     return World(
         n=n,
         rigid=rigid,
@@ -165,7 +165,7 @@ def world_of(touch: Touch, table: Table, law: str) -> World:
         half=half,
         radius=bottle.radius,
         tube=bottle.mass,
-        own=bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12),
+        tube_inertia=bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12),
         m=scenario.slice_mass,
         rub=scenario.drag / scenario.slice_mass,
         gravity=scenario.gravity,
@@ -174,7 +174,7 @@ def world_of(touch: Touch, table: Table, law: str) -> World:
         friction=table.friction,
         rod=rod,
         saddle=saddle,
-        upright=math.atan2(bottle.radius, rest),
+        upright=math.atan2(bottle.radius, z_rest),
         cap=math.pi - math.atan2(bottle.radius, upside_down),
         cap_saddle=scenario.total_mass * scenario.gravity * math.hypot(bottle.radius, upside_down),
         touching=TOUCHING,
@@ -273,8 +273,8 @@ def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, objec
     elif not run.rise <= ENERGY_RISE:
         reason = f"an impact raises the energy by {run.rise:.2g} of the saddle, more than {ENERGY_RISE:g}"
     elif len(codes) > 1:
-        other = next(twin.code for twin in twins if twin.code != run.code)
-        reason = f"a touch that differs by {100 * shift:.2g} % ends {names[other]} instead of {names[run.code]}"
+        differing = next(twin.code for twin in twins if twin.code != run.code)
+        reason = f"a touch that differs by {100 * shift:.2g} % ends {names[differing]} instead of {names[run.code]}"
     return Outcome(
         outcome="undecided" if reason else names[run.code],
         certified=None if reason else run.time,

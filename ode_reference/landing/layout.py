@@ -38,7 +38,7 @@ class World(NamedTuple):
     half: float
     radius: float
     tube: float
-    own: float
+    tube_inertia: float
     m: float
     rub: float
     gravity: float

@@ -35,7 +35,7 @@ def land(q, s, w, dt, longest, fly, world, every, record):
     n = world.n
     rows = 0
     count = 4 if world.rigid else 4 + n + 1
-    gap, late, rate, ahead = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+    gap, gap1, rate, ahead = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
     closed, touching, taking = np.zeros(count, np.bool_), np.zeros(count, np.bool_), np.zeros(count, np.bool_)
     free, target, work = np.empty(2), np.empty(4), np.empty((3, n + 1))
     x, y, pn, pt = np.empty(n), np.empty(n), np.empty(4), np.empty(4)
@@ -101,17 +101,17 @@ def land(q, s, w, dt, longest, fly, world, every, record):
             if not step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1):
                 unresolved += 1
             sine1, cosine1 = math.sin(q1[2]), math.cos(q1[2])
-            gaps(s1, q1, sine1, cosine1, world, late)
+            gaps(s1, q1, sine1, cosine1, world, gap1)
             again, crossed, until = False, False, h
             for k in range(count):
-                if closed[k] or late[k] >= -tolerance or late[k] >= gap[k]:
+                if closed[k] or gap1[k] >= -tolerance or gap1[k] >= gap[k]:
                     continue
                 if gap[k] <= near:
                     closed[k] = True
                     again = True
                 else:
                     crossed = True
-                    until = min(until, first_zero(gap[k], rate[k], late[k], h))
+                    until = min(until, first_zero(gap[k], rate[k], gap1[k], h))
             if again:
                 continue
             if not crossed:
@@ -122,23 +122,23 @@ def land(q, s, w, dt, longest, fly, world, every, record):
                 steps += 1
                 step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1)
                 sine1, cosine1 = math.sin(q1[2]), math.cos(q1[2])
-                gaps(s1, q1, sine1, cosine1, world, late)
+                gaps(s1, q1, sine1, cosine1, world, gap1)
                 rates(w1, q1, sine1, cosine1, world, ahead)
-                early, least = high - h, np.inf
+                early, min_gap = high - h, np.inf
                 for k in range(count):
                     if not closed[k] and gap[k] > near:
-                        least = min(least, late[k])
+                        min_gap = min(min_gap, gap1[k])
                         if ahead[k] < 0.0:
-                            early = min(early, late[k] / -ahead[k])
-                if abs(least) <= tolerance or high - low < 1e-15:
+                            early = min(early, gap1[k] / -ahead[k])
+                if abs(min_gap) <= tolerance or high - low < 1e-15:
                     break
-                if least > 0.0:
+                if min_gap > 0.0:
                     low = h
                 else:
                     high = h
                     for k in range(count):
-                        if not closed[k] and gap[k] > near and late[k] < 0.0:
-                            early = min(early, late[k] / max(-ahead[k], STILL))
+                        if not closed[k] and gap[k] > near and gap1[k] < 0.0:
+                            early = min(early, gap1[k] / max(-ahead[k], STILL))
                 h = h + early if low < h + early < high else (low + high) / 2
             break
         t += h

@@ -24,7 +24,7 @@ def step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1
         sum1 += s1[i]
         sum2 += s1[i] * s1[i]
     m_all = world.tube + m * n
-    a12, a22 = m * sum1, world.own + m * sum2
+    a12, a22 = m * sum1, world.tube_inertia + m * sum2
     det = m_all * a22 - a12 * a12
     omega = q[5]
     start = v_r + world.gravity * cosine * h
@@ -82,7 +82,7 @@ def step(q, s, w, h, closed, world, free, target, work, x, y, pn, pt, q1, s1, w1
 def energy(q, s, w, sine, cosine, world):
     """Return the energy over the table [J]; ``sine`` and ``cosine`` are of theta."""
     v_r, v_t = q[3] * sine - q[4] * cosine, q[3] * cosine + q[4] * sine
-    total = world.tube * ((q[3] * q[3] + q[4] * q[4]) / 2 + world.gravity * q[1]) + world.own * q[5] * q[5] / 2
+    total = world.tube * ((q[3] * q[3] + q[4] * q[4]) / 2 + world.gravity * q[1]) + world.tube_inertia * q[5] * q[5] / 2
     for i in range(world.n):
         along, across = v_r + w[i], v_t + s[i] * q[5]
         total += world.m * ((along * along + across * across) / 2 + world.gravity * (q[1] - s[i] * cosine))

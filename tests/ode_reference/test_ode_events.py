@@ -60,7 +60,7 @@ def flight_of(*polynomials, stop, parts=1, on_base=False):
 def first_leg(flight):
     """Fly the first segment by steps that are as long as they may be."""
     with patch.object(ode_reference.witness, "solve_ivp", partial(solve_ivp, first_step=flight.settings["max_step"])):
-        flight._leg()
+        flight._advance()
 
 
 def first_wall(*polynomials, stop, parts=1):
