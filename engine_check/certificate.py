@@ -267,7 +267,7 @@ def certified(scenario: Scenario, engine: str, **settings: Any) -> Trajectory:
 
 def _observed_order(runs: Runs, at: Trial) -> tuple[float, str]:
     """Return the order of the mean changes of 4h, 2h, h, or NaN and why."""
-    coarsest, coarse, run = (runs.known(at.dt * factor, at.iterations) for factor in (4.0, 2.0, 1.0))
+    coarsest, coarse, run = (runs.completed(at.dt * factor, at.iterations) for factor in (4.0, 2.0, 1.0))
     if coarsest is None or coarse is None or run is None:
         return math.nan, "three levels of the step are needed, and not all of them are complete"
     # The mean over time: the largest is set by the one output time at which an impact is seen a step late.
@@ -281,7 +281,7 @@ def _observed_order(runs: Runs, at: Trial) -> tuple[float, str]:
 
 
 def _extrapolated(runs: Runs, at: Trial, run: Trajectory, order: int) -> FloatArray:
-    coarse = runs.known(2 * at.dt, at.iterations)
+    coarse = runs.completed(2 * at.dt, at.iterations)
     if coarse is None or not run.ok:
         return np.full(len(run.t), np.nan)
     return np.asarray(run.omega + (run.omega - coarse.omega) / (2**order - 1))
@@ -289,7 +289,7 @@ def _extrapolated(runs: Runs, at: Trial, run: Trajectory, order: int) -> FloatAr
 
 def _band(runs: Runs, at: Trial, run: Trajectory, order: float) -> tuple[FloatArray, str]:
     """Return the band, and why there is none or why it is wide; an empty string if neither."""
-    coarsest, coarse = (runs.known(at.dt * factor, at.iterations) for factor in (4.0, 2.0))
+    coarsest, coarse = (runs.completed(at.dt * factor, at.iterations) for factor in (4.0, 2.0))
     bent = runs.bent(2 * at.dt, at.iterations)
     nothing = np.full(len(run.t), np.nan)
     if coarse is None or not run.ok:
@@ -313,7 +313,7 @@ def _band(runs: Runs, at: Trial, run: Trajectory, order: float) -> tuple[FloatAr
         why = f"the band is wide, by {moved:.2g} omega_0: {widest}" if moved > at.tolerance else ""
     else:
         band, why = SAFETY * runs.spread(run, at.iterations), ""
-    more = runs.known(at.dt, 2 * at.iterations) if at.iterations is not None else None
+    more = runs.completed(at.dt, 2 * at.iterations) if at.iterations is not None else None
     if more is not None:
         band = band + 2 * runs.apart(more, run)
     return np.asarray(np.maximum.accumulate(np.maximum(band, FLOOR))), why

@@ -170,12 +170,12 @@ class _Flight:
             self._record()
         return self._status == "ok"
 
-    def _some_steps(self, now: float, h: float, most: int) -> int:
+    def _some_steps(self, now: float, h: float, max_steps: int) -> int:
         """Take one step with all its impacts, or several if no slice meets an end; return how many."""
         if not self._world.movable:
-            self._step(h, most)
-            return most
-        count = self._unwatched(h, most)
+            self._step(h, max_steps)
+            return max_steps
+        count = self._unwatched(h, max_steps)
         start = self._save()
         self._step(h, count)
         clean = not self._outside() and not (count > 1 and self._contacts.released())
@@ -196,9 +196,9 @@ class _Flight:
             self._contacts.resolve(now + h)
         return 1
 
-    def _unwatched(self, h: float, most: int) -> int:
+    def _unwatched(self, h: float, max_steps: int) -> int:
         """Return how many steps can be taken without a look at the ends."""
-        longest = min(2 * self._look, most, int(LONGEST_LOOK / (abs(self._scenario.omega0) * h)))
+        longest = min(2 * self._look, max_steps, int(LONGEST_LOOK / (abs(self._scenario.omega0) * h)))
         if self._careful or longest < 2:
             return 1
         world = self._world

@@ -125,11 +125,11 @@ def check_asked(scenario: Scenario, engine: str, ice: str, slices: str) -> None:
         ("ice", ice, ICE_MODELS, ICE_MODELS),
         ("slices", slices, CONTACTS, has.contacts),
     )
-    for what, name, known, offered in choices:
-        if name not in known:
-            raise ValueError(unknown_name(f"{what} =", name, known))
+    for argument, name, valid, offered in choices:
+        if name not in valid:
+            raise ValueError(unknown_name(f"{argument} =", name, valid))
         if name not in offered:
-            raise ValueError(f"engine = {engine!r} has no {what} = {name!r} (it has: {', '.join(offered)})")
+            raise ValueError(f"engine = {engine!r} has no {argument} = {name!r} (it has: {', '.join(offered)})")
     if scenario.n_slices > MAX_SLICES:
         raise ValueError(f"n_slices = {scenario.n_slices} is outside [1, {MAX_SLICES}] for an engine; cut it coarser")
     fastest, spin = math.hypot(*scenario.launch_velocity), abs(scenario.omega0) * scenario.bottle.length

@@ -149,8 +149,8 @@ def land(
         if not reason or coarse.reason or fine.reason:
             break
     twins = []
-    if not reason and (other := run(touch, 2 * step, ALMOST_CLOSED).outcome) != fine.outcome:
-        reason = f"with things that touch within {ALMOST_CLOSED:g} L it ends {other} instead of {fine.outcome}"
+    if not reason and (closed_outcome := run(touch, 2 * step, ALMOST_CLOSED).outcome) != fine.outcome:
+        reason = f"with things that touch within {ALMOST_CLOSED:g} L it ends {closed_outcome} instead of {fine.outcome}"
     for twin in touch.twins(TWIN) if not reason else ():
         twins.append(run(twin, 2 * step).outcome)
         if twins[-1] != fine.outcome:
@@ -404,9 +404,9 @@ class World:
             chosen = np.repeat(taking, 1 + kinds)
             bound = np.zeros(len(rows))
             bound[first_row[k]] = -self.scenario.restitution * approach[k]
-            own = np.ascontiguousarray(response[np.ix_(chosen, chosen)])
+            block = np.ascontiguousarray(response[np.ix_(chosen, chosen)])
             p, ok = impulses(
-                own, rows[chosen] @ (velocities + change), bound[chosen], kinds[taking], self.table.friction
+                block, rows[chosen] @ (velocities + change), bound[chosen], kinds[taking], self.table.friction
             )
             if not ok:
                 return change, False
@@ -451,8 +451,8 @@ class World:
                 chosen = np.repeat(taking, 1 + kinds)
                 bound = np.zeros(len(rows))
                 bound[first_row] = np.maximum(-restitution * (rows[first_row] @ before), 0.0)
-                own = np.ascontiguousarray(response[np.ix_(chosen, chosen)])
-                p, ok = impulses(own, rows[chosen] @ free, bound[chosen], kinds[taking], self.table.friction)
+                block = np.ascontiguousarray(response[np.ix_(chosen, chosen)])
+                p, ok = impulses(block, rows[chosen] @ free, bound[chosen], kinds[taking], self.table.friction)
                 if not ok:
                     return "the impulses of a step have not converged"
                 change = p @ solved[chosen]

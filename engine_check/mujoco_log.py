@@ -10,7 +10,7 @@ from typing import Any, Final
 import mujoco
 
 _LOCK: Final = threading.Lock()
-_FOUND: Final[list[Callable[[str], Any] | None]] = []
+_HANDLERS: Final[list[Callable[[str], Any] | None]] = []
 """The handlers of warnings that runs found, one a run; the first is the one to be put back."""
 
 
@@ -18,12 +18,12 @@ _FOUND: Final[list[Callable[[str], Any] | None]] = []
 def no_log() -> Iterator[None]:
     """Keep MuJoCo from writing its warnings to a file until the last run of all threads ends; a run has its status."""
     with _LOCK:
-        _FOUND.append(mujoco.get_mju_user_warning())
+        _HANDLERS.append(mujoco.get_mju_user_warning())
         mujoco.set_mju_user_warning(lambda _: None)
     try:
         yield
     finally:
         with _LOCK:
-            before = _FOUND.pop()
-            if not _FOUND:
+            before = _HANDLERS.pop()
+            if not _HANDLERS:
                 mujoco.set_mju_user_warning(before)

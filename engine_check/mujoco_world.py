@@ -105,12 +105,12 @@ def build(scenario: Scenario, dt: float) -> World:
             f"omega0, theta0 or launch_velocity = {fastest:g} is outside (-{mujoco.mjMAXVAL:g}, {mujoco.mjMAXVAL:g}), "
             "the range of MuJoCo"
         )
-    bottle, least = scenario.bottle, mujoco.mjMINVAL
+    bottle, min_value = scenario.bottle, mujoco.mjMINVAL
     for words, value, above in (
-        ("bottle.mass [kg]", bottle.mass, least),
-        ("bottle.mass * bottle.radius^2 [kg m^2]", bottle.mass * bottle.radius**2, least),
+        ("bottle.mass [kg]", bottle.mass, min_value),
+        ("bottle.mass * bottle.radius^2 [kg m^2]", bottle.mass * bottle.radius**2, min_value),
         ("bottle.length / bottle.radius", bottle.length / bottle.radius, FLATTEST),
-        ("water_mass / n_slices [kg]", scenario.slice_mass, least),
+        ("water_mass / n_slices [kg]", scenario.slice_mass, min_value),
     ):
         if not value > above:
             raise ValueError(f"{words} = {value:g} is outside ({above:g}, inf), the range of MuJoCo")

@@ -61,11 +61,11 @@ def meets_walls_only(shape: pymunk.Shape, group: int = 0) -> None:
 
 def neighbour_shape(body: pymunk.Body, index: int, radius: float, restitution: float, friction: float) -> pymunk.Shape:
     """Return the shape by which slice ``index``, counted from the base, meets the slices before and after it."""
-    own, other = (EVEN, ODD) if index % 2 == 0 else (ODD, EVEN)
+    category, mask = (EVEN, ODD) if index % 2 == 0 else (ODD, EVEN)
     circle = pymunk.Circle(body, radius)
-    circle.elasticity = restitution if own == EVEN else 1.0
+    circle.elasticity = restitution if category == EVEN else 1.0
     circle.friction = friction
-    circle.filter = pymunk.ShapeFilter(categories=own, mask=other)
+    circle.filter = pymunk.ShapeFilter(categories=category, mask=mask)
     return circle
 
 
@@ -93,13 +93,13 @@ def wall_circles(slices: Iterable[pymunk.Body]) -> list[pymunk.Circle]:
 
 def read_back(tube: pymunk.Body, slices: Sequence[pymunk.Body]) -> dict[str, float]:
     """Return what the engine's shapes let slices do to each other; the pairs are those its own filters pass."""
-    own = [[s for s in _circles(body) if not s.filter.categories & WALLS] for body in slices]
+    slice_shapes = [[s for s in _circles(body) if not s.filter.categories & WALLS] for body in slices]
     pairs = [_meeting(_circles(a), _circles(b)) for a, b in pairwise(slices)]
     contacts = [contact for pair in pairs for contact in pair]
     held = {
         "slices_that_collide": float(sum(bool(pair) for pair in pairs)),
-        "neighbour_shapes": float(sum(len(shapes) for shapes in own)),
-        "neighbour_shapes_at_caps": float(sum(len(_meeting(list(tube.shapes), shapes)) for shapes in own)),
+        "neighbour_shapes": float(sum(len(shapes) for shapes in slice_shapes)),
+        "neighbour_shapes_at_caps": float(sum(len(_meeting(list(tube.shapes), shapes)) for shapes in slice_shapes)),
         "second_neighbours_that_collide": float(
             sum(bool(_meeting(_circles(a), _circles(b))) for a, b in zip(slices, slices[2:], strict=False))
         ),

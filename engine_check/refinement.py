@@ -153,22 +153,22 @@ class Runs:
         self.history: list[Level] = []
         self.movable = ENGINES[engine].movable and not scenario.frozen
         self._moved: dict[tuple[float, int | None], Trajectory] = {}
-        self._made: dict[tuple[float, int | None], Trajectory] = {}
+        self._runs: dict[tuple[float, int | None], Trajectory] = {}
         self._bent: dict[tuple[float, int | None], FloatArray] = {}
 
-    def known(self, dt: float, iterations: int | None) -> Trajectory | None:
+    def completed(self, dt: float, iterations: int | None) -> Trajectory | None:
         """Return the run at these settings if it was made and is complete."""
-        run = self._made.get((dt, iterations))
+        run = self._runs.get((dt, iterations))
         return run if run is not None and run.ok else None
 
     def make(self, role: str, dt: float, iterations: int | None, against: Trajectory | None = None) -> Trajectory:
         """Return the run at these settings, and note what it changes ``against`` another."""
-        if (dt, iterations) not in self._made:
+        if (dt, iterations) not in self._runs:
             run, cost = self._flown(self.scenario, dt, iterations)
-            self._made[dt, run.settings.get("iterations")] = run
+            self._runs[dt, run.settings.get("iterations")] = run
             self._note(role, dt, run, cost, None if against is None else self.apart(run, against))
             return run
-        return self._made[dt, iterations]
+        return self._runs[dt, iterations]
 
     def bend(self, dt: float, iterations: int | None) -> Trajectory | FloatArray:
         """Return the largest |omega(d) + omega(-d) - 2 omega(0)| at these settings, or a member that diverged."""
@@ -191,7 +191,7 @@ class Runs:
         self, role: str, changes: Sequence[tuple[float, FloatArray]], dt: float, iterations: int | None
     ) -> Trajectory | FloatArray:
         """Return the largest bend by ``changes``: steps, and by how many of them each slice moves."""
-        middle, bends = self._made[dt, iterations], []
+        middle, bends = self._runs[dt, iterations], []
         tells = abs(self.scenario.omega0) * dt
         if middle.settings["hits"] == "located":
             tells *= tells
@@ -215,7 +215,7 @@ class Runs:
         """
         omegas, means = [], []
         for step in (dt, 2 * dt, 4 * dt):
-            run = self.known(step, iterations)
+            run = self.completed(step, iterations)
             moved = None if run is None else self._off_the_grid(step, iterations, run)
             if run is None or moved is None or not moved.ok:
                 break
@@ -225,8 +225,8 @@ class Runs:
             return moved
         # Half a step is half the delay.
         levels = zip(omegas, means, means[1:], (1.0, 2.0), strict=False)
-        off = [(np.abs(omega - fine) + np.abs(coarse - fine)) / share for omega, fine, coarse, share in levels]
-        return np.asarray(np.max(off, axis=0) / abs(self.scenario.omega0))
+        deviations = [(np.abs(omega - fine) + np.abs(coarse - fine)) / share for omega, fine, coarse, share in levels]
+        return np.asarray(np.max(deviations, axis=0) / abs(self.scenario.omega0))
 
     def _off_the_grid(self, dt: float, iterations: int | None, run: Trajectory) -> Trajectory:
         if (dt, iterations) not in self._moved:
@@ -237,9 +237,9 @@ class Runs:
 
     def spread(self, run: Trajectory, iterations: int | None) -> FloatArray:
         """Return how far any complete run at these iterations, and any bend, lies from ``run``, shape (P,)."""
-        runs = [*self._made.items(), *self._moved.items()]
-        others = [self.apart(run, other) for (_, n), other in runs if n == iterations and other.ok]
-        return np.asarray(np.max([*others, *(bent for (_, n), bent in self._bent.items() if n == iterations)], axis=0))
+        runs = [*self._runs.items(), *self._moved.items()]
+        gaps = [self.apart(run, candidate) for (_, n), candidate in runs if n == iterations and candidate.ok]
+        return np.asarray(np.max([*gaps, *(bent for (_, n), bent in self._bent.items() if n == iterations)], axis=0))
 
     def bent(self, dt: float, iterations: int | None) -> FloatArray | None:
         """Return what ``bend`` returned at these settings, if it was asked and complete."""
@@ -247,7 +247,7 @@ class Runs:
 
     def earlier(self, dt: float, iterations: int | None) -> FloatArray:
         """Return what moved omega when twice this step was on trial, as far as known; zero if it was not."""
-        coarsest, coarse = self.known(4 * dt, iterations), self.known(2 * dt, iterations)
+        coarsest, coarse = self.completed(4 * dt, iterations), self.completed(2 * dt, iterations)
         moved = [np.zeros(1)]
         if coarsest is not None and coarse is not None:
             moved.append(self.apart(coarsest, coarse))
@@ -255,10 +255,10 @@ class Runs:
             moved.append(bent)
         return np.asarray(np.max(np.broadcast_arrays(*moved), axis=0))
 
-    def apart(self, one: Trajectory, other: Trajectory) -> FloatArray:
+    def apart(self, first: Trajectory, second: Trajectory) -> FloatArray:
         """Return |difference of omega| at the times both reached, fraction of omega_0, shape (P,)."""
-        both = min(len(one.t), len(other.t))
-        return np.asarray(np.abs(one.omega[:both] - other.omega[:both]) / abs(self.scenario.omega0))
+        both = min(len(first.t), len(second.t))
+        return np.asarray(np.abs(first.omega[:both] - second.omega[:both]) / abs(self.scenario.omega0))
 
     def _flown(self, scenario: Scenario, dt: float, iterations: int | None, **more: Any) -> tuple[Trajectory, float]:
         began = time.perf_counter()
@@ -315,7 +315,7 @@ def search(runs: Runs, tolerance: float, levels: int) -> Trial:
 
 def _trial(runs: Runs, tolerance: float, dt: float, iterations: int | None) -> tuple[Trial, bool]:
     """Return the verdict on one pair of settings, and whether iterations are what has to be refined."""
-    run = runs.make("on trial", dt, iterations, against=runs.known(2 * dt, iterations))
+    run = runs.make("on trial", dt, iterations, against=runs.completed(2 * dt, iterations))
 
     def refused(status: str, reason: str, horizon: float) -> Trial:
         return Trial(status=status, reason=reason, dt=dt, iterations=iterations, horizon=horizon, tolerance=tolerance)
@@ -344,10 +344,10 @@ def _changed(runs: Runs, role: str, run: Trajectory, dt: float, iterations: int 
     if role == EARLIER:
         return runs.earlier(dt, iterations)
     if role == ITERATED and iterations is not None:
-        other = runs.make(role, dt, min(2 * iterations, MAX_ITERATIONS), against=run)
+        varied = runs.make(role, dt, min(2 * iterations, MAX_ITERATIONS), against=run)
     else:
-        other = runs.make(role, 2 * dt, iterations, against=run)
-    return runs.apart(run, other) if other.ok else other
+        varied = runs.make(role, 2 * dt, iterations, against=run)
+    return runs.apart(run, varied) if varied.ok else varied
 
 
 def _reached(run: Trajectory) -> float:

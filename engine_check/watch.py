@@ -25,7 +25,7 @@ class Bound:
     """The largest admissible residual, what it is measured against, why, and what to do when it is left."""
 
     limit: float
-    what: str
+    reference: str
     reason: str
     remedy: str
 
@@ -165,5 +165,5 @@ def first_left(residuals: Mapping[str, float], bounds: Mapping[str, Bound]) -> t
         # Written as "not inside", because NaN passes every "outside" test.
         if not residuals[name] <= bound.limit:
             value = f"{name.replace('_', ' ')} {residuals[name]:.3g}"
-            return name, f"{value} exceeds {bound.limit:g} ({bound.what}); {bound.remedy}"
+            return name, f"{value} exceeds {bound.limit:g} ({bound.reference}); {bound.remedy}"
     return "", ""

@@ -175,7 +175,7 @@ def test_a_grid_moved_by_half_a_step_is_as_exact_until_it_answers_a_hit_at_anoth
 
 
 def test_a_run_beside_it_that_diverged_leaves_no_band(monkeypatch):
-    monkeypatch.setattr(Runs, "shake", lambda self, *_: replace(self.known(*_), message="it burst"))
+    monkeypatch.setattr(Runs, "shake", lambda self, *_: replace(self.completed(*_), message="it burst"))
     verdict = certify(SHORT, times=[0.0, 0.02])
     assert np.isnan(verdict.largest_band)
     assert "it burst" in verdict.to_mapping()["band_reason"]
