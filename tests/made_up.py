@@ -15,7 +15,7 @@ from flipproof.figures.style import Drawing
 from flipproof.frame.flights import Flights
 from flipproof.frame.gather import Gathered, evaluate, gather
 from flipproof.frame.pool import SerialExecutor, make_each
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Run, RunResult
 from flipproof.output.provenance import provenance
 from flipproof.output.summary import summarise
 from flipproof.page.render import render
@@ -91,7 +91,7 @@ def is_number(cell):
 class Answers(Executor):
     """Answers runs by ``of``; other calls are made at once, in this process."""
 
-    def __init__(self, of: Callable[[Run], Made]) -> None:
+    def __init__(self, of: Callable[[Run], RunResult]) -> None:
         self.of = of
         self.asked: list[Run] = []
 
@@ -105,7 +105,7 @@ class Answers(Executor):
 def spoiled(gathered: Gathered, broken: Iterable[Run], reason: str, chapters: Iterable[str]) -> Gathered:
     """Return the same report with some runs failed, and the chapters that look at them studied anew."""
     lost = set(broken)
-    made = {run: Made(run, None, 0.1, reason) if run in lost else each for run, each in gathered.flights.items()}
+    made = {run: RunResult(run, None, 0.1, reason) if run in lost else each for run, each in gathered.flights.items()}
     again = gather(chapters_named(*chapters), gathered.ask, Answers(made.__getitem__))
     return replace(gathered, flights=Flights(made), outcomes={**gathered.outcomes, **again.outcomes})
 

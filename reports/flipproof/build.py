@@ -118,13 +118,13 @@ def build(
     with gathered.stages.lap("page"):
         pages = render(gathered, results, provenance, summary)
     summary["stages"]["page"] = round(gathered.stages.seconds["page"], 3)
-    present = [result for result in results.values() if result.found is not None]
+    present = [result for result in results.values() if result.study_result is not None]
     return Report(
         findings=tuple(finding for result in results.values() for finding in result.findings),
         exhibits=exhibits,
         pages=pages,
         summary=summary,
-        tables={path: text for result in present for path, text in result.chapter.tables(result.found).items()},
+        tables={path: text for result in present for path, text in result.chapter.tables(result.study_result).items()},
         seconds={id_: seconds for result in results.values() for id_, seconds in result.seconds.items()},
         whole=sum(gathered.stages.seconds.values()),
     )

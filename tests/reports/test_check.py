@@ -12,7 +12,7 @@ from flipproof.check import throw as check_module
 from flipproof.check.throw import CHECKS, check, findings_of, groups, line
 from flipproof.frame import pool
 from flipproof.frame.findings import Finding
-from flipproof.frame.solvers import Made
+from flipproof.frame.solvers import RunResult
 from flipproof.frame.solvers import make as really_make
 from flipproof.output.summary import summary_text
 from slicemodel import Scenario
@@ -118,7 +118,7 @@ def test_a_threshold_of_the_baseline_holds_for_the_other_groups_too(tmp_path):
 def test_a_solver_that_fails_is_a_failed_check_with_its_reason(monkeypatch):
     def broken(run):
         if run.solver == "eq8":
-            return Made(run, None, 0.0, "RuntimeError: no\nluck")
+            return RunResult(run, None, 0.0, "RuntimeError: no\nluck")
         return really_make(run)
 
     monkeypatch.setattr(pool, "make", broken)
@@ -133,7 +133,7 @@ def test_a_solver_that_fails_is_a_failed_check_with_its_reason(monkeypatch):
 
 def test_a_difference_without_one_of_its_runs_is_not_evaluated(monkeypatch, place):
     def broken(run):
-        return Made(run, None, 0.0, "RuntimeError: no luck")
+        return RunResult(run, None, 0.0, "RuntimeError: no luck")
 
     monkeypatch.setattr(pool, "make", broken)
     monkeypatch.setattr(errata, "study_errata", lambda _: {})

@@ -15,7 +15,7 @@ from flipproof.chapters.engine_facts.chapter import (
     rebound_of_two,
     speed_through_wall,
 )
-from flipproof.frame.solvers import Made, make
+from flipproof.frame.solvers import RunResult, make
 from slicemodel import Scenario
 
 PYMUNK = (
@@ -73,7 +73,7 @@ def test_an_engine_that_is_missing_is_not_evaluated_and_no_failure(made, monkeyp
 def test_a_fact_whose_run_is_missing_or_stopped_fails(made):
     broken = dict(made)
     usual = made["usual"]
-    broken["usual"] = Made(usual.run, None, 0.0, "MemoryError: too much")
+    broken["usual"] = RunResult(usual.run, None, 0.0, "MemoryError: too much")
     finding = measured(broken)["gravity"]
     assert (finding.id, finding.value, finding.failed) == ("engine-fact-gravity", None, True)
     assert "MemoryError" in finding.note

@@ -61,7 +61,7 @@ class Reported:
 
     @property
     def visits(self):
-        return self.gathered.found("guests")
+        return self.gathered.result("guests")
 
     def figures(self):
         return {figure.name: figure for each in self.results.values() for figure in each.figures}
@@ -97,17 +97,17 @@ def curve_of(folder, fmt="%.18g"):
 
 
 def test_a_guest_flies_beside_all_other_solvers(reported):
-    flown = reported.gathered.found("flights")
+    flown = reported.gathered.result("flights")
     assert [run.label for run in flown.drawn][-2:] == ["naive RK4", "naive RK4, no gravity"]
     assert flown.tables["naive RK4"] == "trajectories/guest-naive-rk4/data.csv"
     assert all("naive RK4" in reported.figures()[name].table for name in ("omega", "theta", "centre-of-mass", "slices"))
-    pairs = {d.second: d for d in reported.gathered.found("differences").pairs}
+    pairs = {d.second: d for d in reported.gathered.result("differences").pairs}
     assert pairs["naive RK4"].first == "eq8"
     assert pairs["naive RK4, no gravity"].first == "eq8-weightless"
     assert reported.findings["guest-naive-rk4-eq8"].value == pairs["naive RK4"].largest < 1e-3
     assert reported.findings["guest-naive-rk4-ice"].value == 0.0
     assert "ice" in reported.figures()
-    pair = reported.gathered.found("agreement")["eq8"].pair("naive RK4", "eq8")
+    pair = reported.gathered.result("agreement")["eq8"].pair("naive RK4", "eq8")
     assert pair.largest == pytest.approx(pairs["naive RK4"].largest, abs=1e-12)
 
 
@@ -169,8 +169,8 @@ def test_solvers_of_one_name_are_told_apart(tmp_path):
     labels = [guest.label for guest in found.guests]
     assert labels == ["naive RK4", f"naive RK4 ({tmp_path / 'rk4.py'}:Eq8)"]
     assert len({guest.slug for guest in found.guests}) == 2
-    assert [run.label for run in found.gathered.found("flights").drawn][-2:] == labels
-    assert len(set(found.gathered.found("flights").tables.values())) == len(found.gathered.found("flights").tables)
+    assert [run.label for run in found.gathered.result("flights").drawn][-2:] == labels
+    assert len(set(found.gathered.result("flights").tables.values())) == len(found.gathered.result("flights").tables)
 
 
 def test_a_guest_does_not_take_the_name_of_one_of_our_own(tmp_path):
@@ -214,8 +214,8 @@ def test_a_hostile_guest_is_named_with_its_reason(tmp_path, name):
     assert all(finding.id.startswith(f"guest-{bad.guest.slug}-") for finding in found.failed)
     pattern = load(f"{HOSTILE}:WRONG").get(name, "5 is neither callable").replace("2 s", "1 s")
     assert any(re.search(pattern, finding.note) for finding in found.failed)
-    assert bad.waterfall.found is None
-    assert good.waterfall.found is not None
+    assert bad.waterfall.result is None
+    assert good.waterfall.result is not None
     assert json.dumps(summarise(bad), allow_nan=False)
 
 
@@ -307,7 +307,7 @@ def test_check_refuses_a_guest_that_is_a_curve_or_named_twice(tmp_path, capsys):
 def test_what_leads_from_a_guest_to_free_flight_is_split(reported):
     free = plateau(TIMES, solve("free-flight", THROW, times=TIMES).omega, THROW.omega0)
     for visit, names in zip(reported.visits, ({"weightless", "origin", "recoil"}, {"origin", "recoil"}), strict=True):
-        found, data = visit.waterfall.found, summarise(visit)["waterfall"]
+        found, data = visit.waterfall.result, summarise(visit)["waterfall"]
         rest, *bars = found.bars
         assert set(data["bars"]) == names
         assert found.end == pytest.approx(free, abs=1e-12)
@@ -339,8 +339,8 @@ def test_a_guest_without_an_equation_or_with_the_wrong_one_has_its_rest(tmp_path
     spec = mine(tmp_path, "wrong", "        return super().solve(ask)\n    equation = 'free-flight'\n")
     found = Reported(spec, chapters=("guests",)).visits[0]
     assert start_of(found) == FREE
-    (rest,) = found.waterfall.found.bars
-    assert rest.average == found.waterfall.found.total
+    (rest,) = found.waterfall.result.bars
+    assert rest.average == found.waterfall.result.total
 
 
 def test_bars_that_miss_the_whole_are_a_mistake_of_the_program(monkeypatch):

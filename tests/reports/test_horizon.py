@@ -25,7 +25,7 @@ from flipproof.chapters.horizon.chapter import (
     study_horizon,
 )
 from flipproof.frame.flights import Flights
-from flipproof.frame.solvers import Made, make, solve
+from flipproof.frame.solvers import RunResult, make, solve
 from slicemodel import Scenario
 
 THROW = Scenario(duration=0.1)
@@ -48,7 +48,7 @@ def made_up(change_of, spoil=None):
 
     def flight(run):
         omega = 20.0 * (1.0 + np.broadcast_to(change_of(run.label), T.shape))
-        return Made(run, trajectory_of(THROW.with_slices(5), T, omega=omega), 0.0)
+        return RunResult(run, trajectory_of(THROW.with_slices(5), T, omega=omega), 0.0)
 
     studies = []
     for solver, levels in plans().items():
@@ -101,13 +101,13 @@ def test_the_amplification_is_the_largest_change_over_what_is_left_of_the_size()
     levels = plan_own(OWN)
     changes = (0.0, 3e-7, -5e-7)
     flights = {
-        run: Made(run, trajectory_of(OWN.scenario, T, omega=20.0 * (1 + change)), 0.0)
+        run: RunResult(run, trajectory_of(OWN.scenario, T, omega=20.0 * (1 + change)), 0.0)
         for run, change in zip(levels[0].runs, changes, strict=True)
     }
     found = claim_amplification(study_horizon("free-flight", True, levels, Flights(flights)))
     assert found.id == "predictability-free-flight"
     assert found.value == pytest.approx(500.0, rel=1e-5, abs=0.0)
-    lost = flights | {levels[0].runs[1]: Made(levels[0].runs[1], None, 0.0, "MemoryError: too much")}
+    lost = flights | {levels[0].runs[1]: RunResult(levels[0].runs[1], None, 0.0, "MemoryError: too much")}
     found = claim_amplification(study_horizon("free-flight", True, levels, Flights(lost)))
     assert (found.value, found.failed) == (None, False)
     assert "MemoryError" in found.note
@@ -135,18 +135,21 @@ def test_every_ensemble_is_read_from_its_own_runs():
 def test_a_solver_that_did_not_run_stays_with_its_reason():
     named = {run.label: run for run in runs_of(plans()["pymunk"])}
     run, member = named["horizon, pymunk, as it is"], named["horizon, pymunk, angle +1e-06"]
-    engine, equation = made_up(lambda _: 0.0, {run: Made(run, None, 0.0, "RuntimeError: not installed")})
+    engine, equation = made_up(lambda _: 0.0, {run: RunResult(run, None, 0.0, "RuntimeError: not installed")})
     assert (engine.ensembles, engine.widest(), engine.horizon) == ((), None, None)
     assert claim_horizon(engine).verdict == claim_angle(engine).verdict == "not evaluated"
     assert not claim_angle(engine).failed
     assert engine.problems == ("horizon, pymunk, as it is: RuntimeError: not installed",)
     (exhibit,) = figures((engine, equation))
     assert "pymunk was not run" in exhibit.alt
-    engine, _ = made_up(lambda _: 0.0, {member: Made(member, None, 0.0, "MemoryError: too much")})
+    engine, _ = made_up(lambda _: 0.0, {member: RunResult(member, None, 0.0, "MemoryError: too much")})
     assert [level.size for level, _ in engine.ensembles if level.kind == "angle"] == [1e-9]
     assert "MemoryError" in engine.problems[0]
     spoil = {
-        run: Made(run, None, 0.0, "x") for level in plans()["pymunk"] if level.kind == "angle" for run in level.runs[1:]
+        run: RunResult(run, None, 0.0, "x")
+        for level in plans()["pymunk"]
+        if level.kind == "angle"
+        for run in level.runs[1:]
     }
     assert claim_angle(made_up(lambda _: 0.0, spoil)[0]).failed
     assert list(figures((replace(engine, ensembles=()),))) == []

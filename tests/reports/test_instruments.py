@@ -29,18 +29,18 @@ def test_a_report_certifies_to_what_solve_asks_by_itself():
 def test_a_quick_report_says_what_it_does_not_certify(gathered, report):
     runs = engine_runs(REFERENCE, "quick")
     assert runs["pymunk"].settings == {"dt": UNCERTIFIED_DT}
-    found = gathered.found("certificates")._replace(uncertified=("pymunk", "mujoco"))
-    outcome = dataclasses.replace(gathered.outcomes["certificates"], found=found)
+    found = gathered.result("certificates")._replace(uncertified=("pymunk", "mujoco"))
+    outcome = dataclasses.replace(gathered.outcomes["certificates"], result=found)
     quick = dataclasses.replace(gathered, outcomes={**gathered.outcomes, "certificates": outcome})
     page = page_of(quick, report.exhibits[0].drawn)["evidence.html"]
     assert "pymunk and MuJoCo: not certified in a quick report" in page
 
 
 def test_every_witness_has_its_certificate(gathered, report, read_page):
-    found = gathered.found("certificates")
+    found = gathered.result("certificates")
     assert tuple(found.certificates) == WITNESSES
     assert all(certificate["status"] == "certified" for certificate in found.certificates.values())
-    agreements = gathered.found("agreement")
+    agreements = gathered.result("agreement")
     assert set(agreements["free-flight"].names) == {"free-flight", "solve_ivp", *WITNESSES}
     assert set(agreements["eq8"].names) == {"eq8", "solve_ivp"}
     assert not any(agreement.words.startswith("all but") for agreement in agreements.values())
@@ -50,16 +50,16 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
 
 def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
     poorer = without(gathered, "mujoco")
-    assert "mujoco" not in poorer.found("certificates").certificates
-    assert set(poorer.found("agreement")["free-flight"].names) == {"free-flight", "solve_ivp", *WITNESSES} - {"mujoco"}
+    assert "mujoco" not in poorer.result("certificates").certificates
+    assert set(poorer.result("agreement")["free-flight"].names) == {"free-flight", "solve_ivp", *WITNESSES} - {"mujoco"}
     results = evaluate(poorer)
-    assert "RuntimeError: not installed" in poorer.found("flights").made["mujoco"].reason
+    assert "RuntimeError: not installed" in poorer.result("flights").made["mujoco"].reason
     assert not [finding.id for each in results.values() for finding in each.findings if finding.failed]
 
 
 def test_without_any_engine_the_equations_are_held_against_the_witness(gathered):
     poorest = without(gathered, *WITNESSES)
-    agreements = poorest.found("agreement")
+    agreements = poorest.result("agreement")
     assert {name: agreement.names for name, agreement in agreements.items()} == {
         "free-flight": ("free-flight", "solve_ivp"),
         "eq8": ("eq8", "solve_ivp"),

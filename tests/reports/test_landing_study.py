@@ -499,9 +499,9 @@ def gathered(throw, store=None):
 
 def test_the_chapter_makes_the_same_and_finds_it_in_the_store(found, tmp_path):
     with RunStore(tmp_path / "runs.sqlite", slow=0.0) as store:
-        made = gathered(THROW, store).found("landing")
+        made = gathered(THROW, store).result("landing")
         assert not store.found_calls
-        again = gathered(THROW, store).found("landing")
+        again = gathered(THROW, store).result("landing")
         assert 2 * len(store.found_calls) == store.calls > 4
     assert shares_csv(made) == shares_csv(found) == shares_csv(again)
 
@@ -518,7 +518,7 @@ def test_calls_hold_every_case_once_and_are_worth_keeping():
 
 def test_a_throw_that_cannot_land_fails_nothing():
     told = evaluate(gathered(replace(THROW, gravity=0.0)))["landing"]
-    assert told.found.cells == {}
+    assert told.study_result.cells == {}
     assert not [finding for finding in told.findings if finding.failed]
     assert {finding.kind for finding in told.findings if finding.id == "landing-undecided"} == {"observation"}
     assert all(figure.drawing.svg.startswith("<?xml") for figure in drawn(told.figures, SerialExecutor(), png=False))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from made_up import trajectory_of
 
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Run, RunResult
 from flipproof.output.motion import (
     FRAMES,
     MAX_SLICES,
@@ -46,7 +46,7 @@ def flown(name="eq8", scenario=THROW, points=400, end=None, status="ok", impacts
 
 
 def made_of(*trajectories):
-    return {run.label: Made(Run(run.label, run.scenario, label=run.label), run, 0.1) for run in trajectories}
+    return {run.label: RunResult(Run(run.label, run.scenario, label=run.label), run, 0.1) for run in trajectories}
 
 
 def unpacked(text, kind):
@@ -82,7 +82,7 @@ def test_impacts_keep_their_time_slice_end_and_speed():
 
 def test_a_solver_that_failed_is_shown_with_its_reason_and_without_any_there_is_no_player():
     made = made_of(flown())
-    made["pymunk"] = Made(Run("pymunk", THROW, label="pymunk"), None, 0.1, "RuntimeError: no engine")
+    made["pymunk"] = RunResult(Run("pymunk", THROW, label="pymunk"), None, 0.1, "RuntimeError: no engine")
     data = motion_data(THROW, made)
     assert [flight["name"] for flight in data["flights"]] == ["eq8"]
     assert data["failed"] == [{"name": "pymunk", "reason": "RuntimeError: no engine"}]
@@ -134,7 +134,7 @@ def test_a_run_without_slices_still_has_a_bottle():
 
 def test_the_template_is_whole_holds_the_data_and_escapes_what_runs_say(read_page):
     made = made_of(flown())
-    made["pymunk"] = Made(Run("pymunk", THROW, label="pymunk"), None, 0.1, "</script><b>&")
+    made["pymunk"] = RunResult(Run("pymunk", THROW, label="pymunk"), None, 0.1, "</script><b>&")
     data = motion_data(THROW, made)
     text = rendered(data)
     read_page(text)

@@ -20,7 +20,7 @@ from flipproof.chapters.overlap.chapter import (
     study_overlap,
 )
 from flipproof.figures.style import draw
-from flipproof.frame.solvers import Made, make
+from flipproof.frame.solvers import RunResult, make
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 
@@ -31,7 +31,7 @@ FILLS = (0.5, 1.0)
 def flat(run, level, status="ok", message=""):
     """A run whose omega is a level of omega_0 from the start."""
     told = {"omega": level * run.scenario.omega0, "status": status, "message": message}
-    return Made(run, trajectory_of(run.scenario, run.settings["times"], **told), 0.0)
+    return RunResult(run, trajectory_of(run.scenario, run.settings["times"], **told), 0.0)
 
 
 LEVELS = {
@@ -81,7 +81,7 @@ def test_a_failure_keeps_its_reason_and_leaves_a_gap():
     def spoil(made):
         of = {run.label: run for run in made}
         failed, burst = of[f"overlap, {PASS}, fill 0.5"], of[f"overlap, {EXCLUDE}, fill 1"]
-        made[failed] = Made(failed, None, 0.0, "SetupError: not the one meant")
+        made[failed] = RunResult(failed, None, 0.0, "SetupError: not the one meant")
         made[burst] = flat(burst, 0.9, "diverged", "overlap 0.02 exceeds 0.01")
 
     study = made_up(spoil)

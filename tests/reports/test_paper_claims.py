@@ -11,7 +11,7 @@ from made_up import trajectory_of
 from flipproof.chapters import chapters_named
 from flipproof.frame.flights import Flights as Answers
 from flipproof.frame.flights import Outcome
-from flipproof.frame.solvers import Made, Missing, Run, make
+from flipproof.frame.solvers import Missing, Run, RunResult, make
 from flipproof.output.templating import environment
 from flipproof.paper import claims_figures_6_7, observe
 from flipproof.paper import claims_figures_8_9 as landing
@@ -55,7 +55,7 @@ def flight(scenario, curve, *, points=1001, theta=None, **told):
 def flown(runs, solver=PUBLISHED):
     """Return flights that were made, by their keys."""
     return CaseFlights(
-        solver=solver, made={key: Made(Run(solver, run.scenario), run, 0.0) for key, run in runs.items()}
+        solver=solver, made={key: RunResult(Run(solver, run.scenario), run, 0.0) for key, run in runs.items()}
     )
 
 
@@ -485,7 +485,7 @@ def test_half_the_slices_give_the_band_and_tolerances_are_added():
 
 
 def test_a_missing_or_broken_flight_leaves_a_claim_undecided_and_says_why():
-    failed = Made(Run("eq8", THROW, label="the tenth"), None, 0.0, "ValueError: no such bottle")
+    failed = RunResult(Run("eq8", THROW, label="the tenth"), None, 0.0, "ValueError: no such bottle")
     judgement = judge(BY_ID["tenth-slows"], CaseFlights(solver="eq8", made={"filling 0.1": failed}))
     assert judgement.verdict == "cannot be decided"
     assert judgement.words == "the tenth: ValueError: no such bottle"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_up import trajectory_of
 
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Run, RunResult
 from flipproof.paper import experiment
 from flipproof.paper.cases import ICE, family, paper_throw
 from flipproof.paper.experiment import OBSERVATIONS, Observation, closest_overall, compare, standing
@@ -29,7 +29,7 @@ def flight(scenario, level, climb=0.0, lands=360.0):
 def flights(level_of, *, ice=1.0, climb=0.0, lands=360.0):
     runs = {case.key: flight(case.scenario, level_of(case.value), climb, lands) for case in family("filling")}
     runs[ICE] = flight(paper_throw(), ice)
-    made = {key: Made(Run(PUBLISHED, run.scenario), run, 0.0) for key, run in runs.items()}
+    made = {key: RunResult(Run(PUBLISHED, run.scenario), run, 0.0) for key, run in runs.items()}
     return CaseFlights(solver=PUBLISHED, made=made)
 
 

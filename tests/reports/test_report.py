@@ -52,7 +52,7 @@ def exhibits_of(gathered):
 
 
 def flights_of(gathered):
-    return [gathered.found("flights").made[name].trajectory for name in FLIGHTS]
+    return [gathered.result("flights").made[name].trajectory for name in FLIGHTS]
 
 
 def test_every_claim_is_evaluated_and_holds(gathered):
@@ -114,10 +114,10 @@ def test_the_csv_of_a_figure_is_what_is_drawn(gathered, report):
     for run in flights_of(gathered):
         column = [float(row[f"omega/omega_0 {run.label} [1]"]) for row in tables["omega"]]
         assert column == pytest.approx(run.omega / run.scenario.omega0, rel=1e-8, abs=0.0)
-    for difference in gathered.found("differences").pairs:
+    for difference in gathered.result("differences").pairs:
         column = [float(row[f"difference in omega/omega_0: {difference.name} [1]"]) for row in tables["differences"]]
         assert max(map(abs, column)) == pytest.approx(difference.largest, rel=1e-8, abs=0.0)
-    waterfall = gathered.found("waterfall")[0]
+    waterfall = gathered.result("waterfall")[0]
     *bars, total, rods = [float(row["mean of all orders [1]"]) for row in tables["waterfall"]]
     assert sum(bars) == pytest.approx(total, abs=1e-7)
     assert total == pytest.approx(waterfall.end, rel=1e-8, abs=0.0)

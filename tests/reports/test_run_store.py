@@ -19,7 +19,7 @@ from flipproof.frame import keys, store
 from flipproof.frame.keys import key_of, key_of_call
 from flipproof.frame.pool import make_all, workers
 from flipproof.frame.run_store import NAME, RunStore, default_place, packed
-from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.solvers import Run, RunResult, make
 from flipproof.frame.store import _write_ahead
 from slicemodel import Scenario
 
@@ -52,7 +52,7 @@ def found(place, run=RUN):
         return runs_kept.find(run)
 
 
-def same(one: Made, other: Made) -> bool:
+def same(one: RunResult, other: RunResult) -> bool:
     """Return whether two runs are the same to the last bit."""
     first, second = one.trajectory, other.trajectory
     arrays = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")

@@ -21,19 +21,19 @@ from flipproof.chapters.stability.chapter import (
     read_panel,
 )
 from flipproof.frame.flights import Flights
-from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.solvers import Run, RunResult, make
 from slicemodel import Scenario
 
 THROW = Scenario()
 SMALL = Layout(panels=((6.0, 10),), dt=(2e-3, 2e-4), iterations=(5, 10, 60), duration=0.1, budget=2e5)
 
 
-def flight(run, error=0.0, message="", points=None, reason="") -> Made:
+def flight(run, error=0.0, message="", points=None, reason="") -> RunResult:
     """A run whose omega is off by a fraction of omega_0 from the middle on; stopped if there is a message."""
     t = run.settings["times"][:points]
     omega = run.scenario.omega0 * (1.0 + error * (t > SMALL.duration / 2))
     ended = {"status": "diverged" if message else "ok", "message": message, "reason": reason}
-    return Made(run, trajectory_of(run.scenario, t, omega=omega, **ended), 0.0)
+    return RunResult(run, trajectory_of(run.scenario, t, omega=omega, **ended), 0.0)
 
 
 def runs_of(panel):
@@ -113,9 +113,9 @@ def test_an_error_that_is_no_number_is_wrong():
 
 
 def test_a_cell_without_a_run_or_a_reference_is_never_good():
-    (panel,) = chart({"dt 0.002 s, 60": lambda run: Made(run, None, 0.0, "MemoryError: too much")})
+    (panel,) = chart({"dt 0.002 s, 60": lambda run: RunResult(run, None, 0.0, "MemoryError: too much")})
     assert (panel.cells[2, 0].grade, panel.cells[2, 0].reason) == ("not run", "MemoryError: too much")
-    (panel,) = chart({"free-flight": lambda run: Made(run, None, 0.0, "stalled")})
+    (panel,) = chart({"free-flight": lambda run: RunResult(run, None, 0.0, "stalled")})
     assert all(cell.grade == "not run" for cell in panel.cells.values())
     assert "free-flight has no result" in panel.cells[0, 0].reason
     assert claim_rule_of_iterations([panel]).failed

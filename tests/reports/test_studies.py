@@ -27,7 +27,7 @@ from flipproof.curves.growth import first_crossing
 from flipproof.curves.order import observed_order
 from flipproof.frame.findings import Band, Finding
 from flipproof.frame.flights import Flights, Outcome
-from flipproof.frame.solvers import Made, Missing, Run
+from flipproof.frame.solvers import Missing, Run, RunResult
 from slicemodel import Impacts, Scenario, Trajectory
 
 SCENARIO = Scenario(n_slices=1)
@@ -248,7 +248,9 @@ def test_bands_of_runs():
     calls = band_calls(runs)
     answers = {call: Outcome(None, "a twin ended early") for call in calls.values()}
     answers |= {calls["eq8"]: Outcome(np.array([1e-9, 2e-7]))}
-    bands = run_bands(runs, calls, Flights({run: Made(run, flight, 0.0) for run, flight in flown.items()}, answers))
+    bands = run_bands(
+        runs, calls, Flights({run: RunResult(run, flight, 0.0) for run, flight in flown.items()}, answers)
+    )
     assert bands["eq8"] == pytest.approx(2e-7)
     assert "published-limit" not in bands
     assert bands["pymunk"] == 2e-3

@@ -136,7 +136,7 @@ def test_a_suite_without_observations_has_no_empty_properties():
 
 def test_two_findings_may_not_share_an_id():
     twice = (FINDINGS[0], replace(FINDINGS[1], id=FINDINGS[0].id))
-    told = ChapterResult(chapter=None, found=None, findings=twice, figures=(), notes=())
+    told = ChapterResult(chapter=None, study_result=None, findings=twice, figures=(), notes=())
     with pytest.raises(ValueError, match="share an id: ice-eq8"):
         summarise(None, {"ice": told}, {"flipproof": "0"}, {})
 

@@ -26,7 +26,7 @@ from flipproof.chapters.waterfall.study import STEP
 from flipproof.figures.style import draw
 from flipproof.frame.equations import NAMES
 from flipproof.frame.flights import Outcome
-from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.solvers import Run, RunResult, make
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 
@@ -35,10 +35,10 @@ FILLS = (0.3, 0.6)
 DRAG, SIGNS, ORIGIN = (NAMES[switch] for switch in ("drag_on_centre", "signs", "origin"))
 
 
-def flat(run: Run, level: float, status: str = "ok") -> Made:
+def flat(run: Run, level: float, status: str = "ok") -> RunResult:
     """A run whose omega jumps from omega_0 to a level at once."""
     points = run.settings.get("steps", 201)
-    return Made(run, trajectory_of(run.scenario, points, omega=level * run.scenario.omega0, status=status), 0.0)
+    return RunResult(run, trajectory_of(run.scenario, points, omega=level * run.scenario.omega0, status=status), 0.0)
 
 
 def made_up(axis, values, level_of, spoil=None):
@@ -147,7 +147,7 @@ def test_fair_shares_colour_a_map_where_every_set_was_flown():
     assert study.shares[:, 1, 0] == pytest.approx([0.1, 0.11, -0.02, 0.0, 0.05, 0.01, 0.04], abs=1e-12)
     assert (study.dominant == RUNGS.index(SIGNS)).all()
     assert study.shares.sum(axis=0) == pytest.approx(study.level["free-flight"] - study.level["published-python"])
-    missing = {**made, runs[5]: Made(runs[5], None, 0.0, "MemoryError: too much")}
+    missing = {**made, runs[5]: RunResult(runs[5], None, 0.0, "MemoryError: too much")}
     assert (study_map(THROW, "gamma", FILLS, (0.1, 0.2), missing).dominant == -1).sum() == 1
 
 
@@ -164,7 +164,7 @@ def test_a_cell_that_could_not_be_computed_carries_its_reason_and_no_colour():
     stalled, failed = "map gamma, row 0, column 1, free-flight", "map gamma, row 1, column 0, eq8"
     spoil = {
         runs[stalled]: flat(runs[stalled], 0.5, "stalled"),
-        runs[failed]: Made(runs[failed], None, 0.0, "MemoryError: too much"),
+        runs[failed]: RunResult(runs[failed], None, 0.0, "MemoryError: too much"),
     }
     study = made_up("gamma", values, by_rung(4), spoil)
     assert study.reason.tolist() == [["", "free-flight: stalled"], ["eq8: MemoryError", ""]]

@@ -75,7 +75,7 @@ def test_a_fresh_reports_numbers_are_those_of_its_differences_and_findings(repor
     check_against_the_rest(report.summary)
     found = {headline.id: headline for headline in headlines(gathered)}
     assert found == of(report.summary)
-    waterfall = gathered.found("waterfall")[0]
+    waterfall = gathered.result("waterfall")[0]
     bars = {bar.name: bar for bar in waterfall.bars if bar.name != STEP}
     best = max(bars.values(), key=lambda bar: abs(bar.average))
     share = found["share"]
@@ -224,7 +224,7 @@ def test_the_answer_names_the_algebra_and_the_weight_where_they_matter(algebra, 
 
 
 def test_a_step_is_taken_apart_by_changing_one_thing_at_a_time(gathered):
-    costs = {cost.way.name: cost for cost in gathered.found("finite-step").costs}
+    costs = {cost.way.name: cost for cost in gathered.result("finite-step").costs}
     assert list(costs) == [way.name for way in WAYS]
     # Without the lag the start costs far less; with the lag alone it is most of what the program loses.
     assert 0.0 < 5 * costs[HELD].start < costs[EVERYTHING].start
@@ -238,7 +238,7 @@ def test_what_is_called_everything_is_the_difference_of_the_program_from_its_own
     found = {headline.id: headline for headline in headlines(gathered)}
     step = next(
         d
-        for d in gathered.found("differences").pairs
+        for d in gathered.result("differences").pairs
         if d.first == "published-python" and d.second == "published-limit"
     )
     assert found["step"].value == pytest.approx(step.largest, rel=1e-12, abs=0.0)

@@ -32,7 +32,7 @@ from flipproof.chapters.work_precision.figure import figure_work_precision
 from flipproof.chapters.work_precision.study import Price, study_work_precision, work_of
 from flipproof.frame.gather import gather
 from flipproof.frame.pool import SerialExecutor
-from flipproof.frame.solvers import Made, Missing, Run, make
+from flipproof.frame.solvers import Missing, Run, RunResult, make
 from flipproof.frame.timing import at_times, batches, make_timed, sampled
 from ode_reference.models import MODELS
 from slicemodel import Scenario, Trajectory
@@ -65,7 +65,7 @@ def quick():
         ask_of(Scenario(), "quick", 6),
         SerialExecutor(),
         work={"work-precision": QUICK},
-    ).found("work-precision")
+    ).result("work-precision")
 
 
 # ---------------------------------------------------------------------- who competes
@@ -154,10 +154,10 @@ def studied(errors, floor=1e-9, spoiled=None):
     for planned in plan.runs():
         if planned.solver == "eq8":
             error = 0.0 if "reference" in planned.label else floor
-            made[planned] = Made(planned, curve(TWO, error), 1.0)
+            made[planned] = RunResult(planned, curve(TWO, error), 1.0)
         else:
             k = round(math.log2((planned.settings["steps"] - 1) / COMMON))
-            made[planned] = Made(planned, curve(TWO, errors[k], **planned.settings), 0.1 * 2**k)
+            made[planned] = RunResult(planned, curve(TWO, errors[k], **planned.settings), 0.1 * 2**k)
     for words, outcome in (spoiled or {}).items():
         at = next(run for run in made if run.label.endswith(words))
         made[at] = replace(made[at], **outcome)
@@ -321,7 +321,7 @@ def test_midpoint_keeps_its_order_through_impacts_only_without_drag(drag, lowest
     plan = plan_work_precision(throw, effort)
     runs = [r for r in plan.runs() if r.label.endswith(", eq8") or "midpoint on" in r.label]
     made = timed([(planned, common_times(throw)) for planned in runs])
-    nothing = {r: Made(r, None, 0.0, "not asked") for r in plan.runs() if r not in made}
+    nothing = {r: RunResult(r, None, 0.0, "not asked") for r in plan.runs() if r not in made}
     found = study_work_precision(plan, nothing | made).curves["midpoint on eq8"]
     assert lowest < found.slope.order < highest
 

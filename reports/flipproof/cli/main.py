@@ -248,8 +248,8 @@ def command_report(options: argparse.Namespace) -> int:
             facts = provenance(command_line()) | store.facts() | facts_of(guests)
             report = build(gathered, facts, store.remembering(pool), bar.show, png=options.png)
         write(report, folder)
-    for visit in gathered.found("guests") or ():
-        certificate = visit.certificate.found
+    for visit in gathered.result("guests") or ():
+        certificate = visit.certificate.result
         print(f"{visit.guest.label}: {certificate.conclusion if certificate else '; '.join(visit.problems.values())}")
     print(f"Cache: {store.whereabouts()}")
     _print_report(report, options.out, time.perf_counter() - began)

@@ -17,13 +17,13 @@ from typing import Any, Generic, Literal, TypeVar
 
 from flipproof.frame.exhibit import Exhibit, Touch
 from flipproof.frame.findings import Band, Finding, Kind, observed, regression
-from flipproof.frame.flights import Call, Flights, Outcome, attempt, known
-from flipproof.frame.solvers import REFERENCE, Made, Missing, Run
+from flipproof.frame.flights import Call, Flights, Outcome, attempt, results_of
+from flipproof.frame.solvers import REFERENCE, Missing, Run, RunResult
 from slicemodel import Scenario
 
 __all__ = [
-    "Absent", "Ask", "Band", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Made", "Missing",
-    "Outcome", "Part", "Run", "Size", "Study", "Touch", "attempt", "judged", "known", "observed", "regression",
+    "Absent", "Ask", "Band", "Call", "Chapter", "Claims", "Exhibit", "Finding", "Flights", "Kind", "Missing", "Outcome",
+    "Part", "Run", "RunResult", "Size", "Study", "Touch", "attempt", "judged", "observed", "regression", "results_of",
 ]  # fmt: skip
 """All that a chapter is written with."""
 
@@ -117,7 +117,7 @@ class Part:
 
 
 def judged(
-    claim: Callable[..., Finding], *about: Any, id: str, title: str, kind: Kind = "regression"
+    claim: Callable[..., Finding], *arguments: Any, id: str, title: str, kind: Kind = "regression"
 ) -> Finding | Absent:
     """Return the finding of a claim of these arguments; if its evidence is missing, what says so under the same id.
 
@@ -125,8 +125,8 @@ def judged(
     """
 
     def evaluate() -> Finding:
-        evidence = (argument.flight if isinstance(argument, Made) else argument for argument in about)
+        evidence = (argument.flight if isinstance(argument, RunResult) else argument for argument in arguments)
         return claim(*(argument.value if isinstance(argument, Outcome) else argument for argument in evidence))
 
     outcome = attempt(evaluate)
-    return outcome.found if outcome.found is not None else Absent(id, title, outcome.reason, kind)
+    return outcome.result if outcome.result is not None else Absent(id, title, outcome.reason, kind)

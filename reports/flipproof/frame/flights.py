@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from flipproof.frame.processes import WorkerDiedError
-from flipproof.frame.solvers import Made, Missing, Run
+from flipproof.frame.solvers import Missing, Run, RunResult
 from slicemodel import Trajectory
 
 T = TypeVar("T")
@@ -32,25 +32,25 @@ class Call:
 class Outcome(Generic[T]):
     """What was found, or the reason why nothing was."""
 
-    found: T | None
+    result: T | None
     reason: str = ""
 
     @property
     def value(self) -> T:
         """What was found; raises Missing with the reason if nothing was."""
-        if self.reason or self.found is None:
+        if self.reason or self.result is None:
             raise Missing(self.reason or "nothing was found")
-        return self.found
+        return self.result
 
 
-class Flights(dict[Run, Made]):
+class Flights(dict[Run, RunResult]):
     """What became of runs and calls, by the run or call itself. ``flights[run]`` raises Missing if it was not made."""
 
-    def __init__(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]] | None = None) -> None:
+    def __init__(self, made: Mapping[Run, RunResult], called: Mapping[Call, Outcome[Any]] | None = None) -> None:
         super().__init__(made)
         self._called = dict(called or {})
 
-    def __missing__(self, run: Run) -> Made:
+    def __missing__(self, run: Run) -> RunResult:
         raise Missing(f"{run.name}: it was not run")
 
     def answer(self, call: Call) -> Any:
@@ -69,24 +69,24 @@ class Flights(dict[Run, Made]):
         """Return the flights of levels of runs; raises Missing if one was not made."""
         return [[self[run].flight for run in level] for level in runs]
 
-    def add(self, made: Mapping[Run, Made], called: Mapping[Call, Outcome[Any]]) -> None:
+    def add(self, made: Mapping[Run, RunResult], called: Mapping[Call, Outcome[Any]]) -> None:
         """Add what became of another wave."""
         self.update(made)
         self._called.update(called)
 
 
-def known(outcomes: Mapping[Key, Outcome[T]]) -> dict[Key, T]:
+def results_of(outcomes: Mapping[Key, Outcome[T]]) -> dict[Key, T]:
     """Return what was found, without those for whom nothing was."""
-    return {key: outcome.found for key, outcome in outcomes.items() if outcome.found is not None}
+    return {key: outcome.result for key, outcome in outcomes.items() if outcome.result is not None}
 
 
-def attempt(study: Callable[..., T], *about: Any) -> Outcome[T]:
+def attempt(study: Callable[..., T], *arguments: Any) -> Outcome[T]:
     """Return what a study of these arguments found, or the reason why its evidence is missing.
 
     ``Missing`` alone says that evidence is absent. Every other exception is a mistake in the program and passes.
     """
     try:
-        return Outcome(study(*about))
+        return Outcome(study(*arguments))
     except Missing as why:
         return Outcome(None, str(why))
 

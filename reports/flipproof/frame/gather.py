@@ -50,9 +50,9 @@ class Gathered:
     flights: Flights
     stages: Stages
 
-    def found(self, name: str) -> Any:
+    def result(self, name: str) -> Any:
         """Return what a chapter found, or None."""
-        return self.outcomes[name].found if name in self.outcomes else None
+        return self.outcomes[name].result if name in self.outcomes else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ class ChapterResult:
     """
 
     chapter: Chapter[Any]
-    found: Any
+    study_result: Any
     findings: tuple[Finding, ...]
     figures: tuple[Exhibit, ...]
     notes: tuple[tuple[str, str], ...]
@@ -159,7 +159,7 @@ def _evaluated(chapter: Chapter[Any], outcome: Outcome[Any]) -> ChapterResult:
         findings.append(Absent(f"chapter-{chapter.name}", chapter.title, reason, chapter.kind))
     return ChapterResult(
         chapter=chapter,
-        found=outcome.found,
+        study_result=outcome.result,
         findings=tuple(finding.finding if isinstance(finding, Absent) else finding for finding in findings),
         figures=tuple(drawn),
         notes=tuple((absent.title, absent.reason) for absent in findings if isinstance(absent, Absent)),

@@ -10,7 +10,7 @@ from typing import Any, Final
 from flipproof.frame.flights import Call, Outcome, attempt, chapter_errors
 from flipproof.frame.processes import WorkerDiedError, processes
 from flipproof.frame.run_store import RunStore
-from flipproof.frame.solvers import Made, Run, find, make
+from flipproof.frame.solvers import Run, RunResult, find, make
 from slicemodel import Scenario
 
 Progress = Callable[[int, int, str], None]
@@ -37,7 +37,7 @@ def make_all(
     progress: Progress,
     calls: Iterable[Call] = (),
     store: RunStore | None = None,
-) -> tuple[dict[Run, Made], dict[Call, Outcome[Any]]]:
+) -> tuple[dict[Run, RunResult], dict[Call, Outcome[Any]]]:
     """Make runs in worker processes, equal ones once, but for those that the store has; keep slow ones there.
 
     One job for each run of an engine and of a witness, and groups of the others. Calls are made beside them, each a
@@ -48,7 +48,7 @@ def make_all(
     died = f"the worker process died {TRIES} times with this"
     keeping = store.remembering(pool)
     pending_calls = {call: (pool if call.timed else keeping).submit(call.function, *call.arguments) for call in calls}
-    finished: dict[Run, Made] = {run: stored for run in runs if (stored := store.find(run)) is not None}
+    finished: dict[Run, RunResult] = {run: stored for run in runs if (stored := store.find(run)) is not None}
     jobs = _jobs([run for run in runs if run not in finished])
     costs = {run: COSTS[_kind(run)] for job in jobs for run in job}
     planned, done = sum(costs.values()) + COSTS["call"] * len(pending_calls), 0
@@ -73,7 +73,7 @@ def make_all(
                     # Each alone, so that only the run that kills its worker is lost.
                     jobs += [[run] for run in job]
                     continue
-                results = [Made(job[0], None, 0.0, f"{died} run ({error})")]
+                results = [RunResult(job[0], None, 0.0, f"{died} run ({error})")]
             for result in results:
                 store.keep(result)
                 finished[result.run] = result
@@ -120,7 +120,7 @@ def _kind(run: Run) -> str:
     return "engine" if run.scenario.n_slices > FEW else "slow"
 
 
-def make_each(runs: Iterable[Run]) -> list[Made]:
+def make_each(runs: Iterable[Run]) -> list[RunResult]:
     """Make runs one after the other."""
     return [make(run) for run in runs]
 

@@ -31,7 +31,7 @@ from typing import Any, Final
 
 from flipproof.frame.keys import changed_since_import, fingerprint, key_of, key_of_call, sources_written, versions_of
 from flipproof.frame.packing import pack, unpack
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Run, RunResult
 from flipproof.frame.store import UNUSABLE, Entry, Store, has_code, is_damage
 from slicemodel import Trajectory
 
@@ -98,16 +98,16 @@ class RunStore(AbstractContextManager["RunStore"]):
                 self._store.close()
             self._store = None
 
-    def find(self, run: Run) -> Made | None:
+    def find(self, run: Run) -> RunResult | None:
         """Return the run as it was kept; None if it was not, or not by this code, or what was kept is damaged."""
         self.asked += 1
         kept = self._get(key_of(run), self.found) if self._store is not None else None
         if kept is None:
             return None
         trajectory, seconds = kept[0]
-        return Made(run, trajectory, seconds) if isinstance(trajectory, Trajectory) else None
+        return RunResult(run, trajectory, seconds) if isinstance(trajectory, Trajectory) else None
 
-    def keep(self, made: Made) -> None:
+    def keep(self, made: RunResult) -> None:
         """Keep a run that was slow and ended in a trajectory."""
         if self._store is not None and made.trajectory is not None and made.seconds >= self.slow:
             run = made.run

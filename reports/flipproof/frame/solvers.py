@@ -119,7 +119,7 @@ def finer(run: Run) -> Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class RunResult:
     """A run that was made, and the seconds it took. ``trajectory`` is None if it failed for ``reason``."""
 
     run: Run
@@ -142,7 +142,7 @@ class Made:
         return self.flight
 
 
-def make(run: Run) -> Made:
+def make(run: Run) -> RunResult:
     """Make one run; whatever it raises becomes its reason, so that a report can show the failure in place."""
     began = time.perf_counter()
     trajectory, reason = None, ""
@@ -154,7 +154,7 @@ def make(run: Run) -> Made:
             reason = f"{flight.status}: {flight.message}"
     except (ValueError, ArithmeticError, MemoryError, RuntimeError) as error:
         reason = f"{type(error).__name__}: {error}"
-    return Made(run, trajectory, time.perf_counter() - began, reason)
+    return RunResult(run, trajectory, time.perf_counter() - began, reason)
 
 
 def solve(name: str, scenario: Scenario, **settings: Any) -> Trajectory:

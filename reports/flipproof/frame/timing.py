@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.frame.solvers import Made, Missing, Run, find, make, solve
+from flipproof.frame.solvers import Missing, Run, RunResult, find, make, solve
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import MIN_VALUE
 from slicemodel.trajectory import FloatArray
@@ -34,11 +34,11 @@ def solve_timed(name: str, scenario: Scenario, **settings: Any) -> tuple[Traject
     return flight, time.perf_counter() - began
 
 
-def make_timed(runs: Sequence[tuple[Run, FloatArray]]) -> list[Made]:
+def make_timed(runs: Sequence[tuple[Run, FloatArray]]) -> list[RunResult]:
     """Make runs one after the other; ``seconds`` is processor time, trajectories are kept at the given times only."""
     for run in {_kind(run): run for run, _ in runs}.values():
         make(_short(run))
-    return [_made_timed(run, times) for run, times in runs]
+    return [_timed_result(run, times) for run, times in runs]
 
 
 def at_times(t: FloatArray, times: FloatArray) -> NDArray[np.int64]:
@@ -85,7 +85,7 @@ def _short(run: Run) -> Run:
     return replace(run, scenario=scenario, settings=settings | few)
 
 
-def _made_timed(run: Run, times: FloatArray) -> Made:
+def _timed_result(run: Run, times: FloatArray) -> RunResult:
     """Make a run three times at the most; one of 0.01 s, repeated or not, outlasts what disturbs it."""
     spent: list[float] = []
     while len(spent) < 3 and sum(spent) <= 0.01:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipproof.figures.spoken import spoken
-from flipproof.frame.solvers import Made
+from flipproof.frame.solvers import RunResult
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray, Impacts
 
@@ -97,7 +97,7 @@ def release_point(scenario: Scenario, r_cm: float) -> FloatArray:
     return r_cm * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
 
 
-def motion_data(throw: Scenario, made: Mapping[str, Made]) -> dict[str, Any] | None:
+def motion_data(throw: Scenario, made: Mapping[str, RunResult]) -> dict[str, Any] | None:
     """Return what the player needs, ready for JSON; None if no solver flew.
 
     ``throw`` is that of all runs, cut as they were; of ``made``, by name, those in ``FLOWN`` are shown, and one that

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.gather import ChapterResult, Gathered
-from flipproof.frame.solvers import Made
+from flipproof.frame.solvers import RunResult
 from flipproof.output.columns import json_ready
 
 SUMMARY_VERSION: Final = 2
@@ -62,8 +62,8 @@ def summarise(
         "provenance": dict(provenance),
     }
     for result in results.values():
-        if result.found is not None:
-            summary |= result.chapter.summary(result.found)
+        if result.study_result is not None:
+            summary |= result.chapter.summary(result.study_result)
     return {name: json_ready(value) for name, value in summary.items()}
 
 
@@ -72,7 +72,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     return json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def _run_mapping(result: Made) -> dict[str, Any]:
+def _run_mapping(result: RunResult) -> dict[str, Any]:
     mapping: dict[str, Any] = {"tag": result.run.name, "solver": result.run.solver, "seconds": round(result.seconds, 4)}
     if result.trajectory is None:
         return mapping | {"status": "failed", "message": result.reason}

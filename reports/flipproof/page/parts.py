@@ -120,11 +120,11 @@ def _chapter(gathered: Gathered, result: ChapterResult, templates: Environment) 
     """Return a chapter's part: what is missing and why, then its own template, or its figures alone."""
     chapter = result.chapter
     text = PLAIN if chapter.template is None else chapter.template.read_text(encoding="utf-8")
-    body = "" if result.found is None else text
-    extra: dict[str, Any] = {} if result.found is None else dict(chapter.page(result.found))
+    body = "" if result.study_result is None else text
+    extra: dict[str, Any] = {} if result.study_result is None else dict(chapter.page(result.study_result))
     return Markup(
         templates.from_string(f"{MACROS}{{{{ missing(notes) }}}}\n{body}").render(
-            found=result.found,
+            found=result.study_result,
             figures=result.figures,
             findings=result.findings,
             notes=result.notes,

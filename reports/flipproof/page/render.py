@@ -77,7 +77,7 @@ def render(
     findings = [finding for result in results.values() for finding in result.findings]
     figures = {figure.name: figure for result in results.values() for figure in result.figures}
     regressions = [finding for finding in findings if finding.kind == "regression"]
-    flown = gathered.found("flights")
+    flown = gathered.result("flights")
     facts = story(summary, {name: figure.table for name, figure in figures.items()})
     controls = sliders(gathered.ask.throw)
     context = dict(
@@ -92,7 +92,7 @@ def render(
         problems=[flight for flight in gathered.flights.values() if flight.trajectory is None],
         notes=[note for result in results.values() for note in result.notes],
         motion=flown.motion if flown is not None else None,
-        measured=gathered.found("measured"),
+        measured=gathered.result("measured"),
         provenance=provenance,
         settings=gathered.ask.scenario.to_toml(),
         terms=TERMS,

@@ -94,9 +94,9 @@ class Headline:
 
 def headlines(gathered: Gathered) -> tuple[Headline, ...]:
     """Return the numbers of the verdict that could be computed."""
-    differences: Differences | None = gathered.found("differences")
-    waterfalls: tuple[Waterfall, ...] = gathered.found("waterfall") or ()
-    costs: StepCosts | None = gathered.found("finite-step")
+    differences: Differences | None = gathered.result("differences")
+    waterfalls: tuple[Waterfall, ...] = gathered.result("waterfall") or ()
+    costs: StepCosts | None = gathered.result("finite-step")
     return (
         *(_pairs(differences) if differences is not None else ()),
         *(_shares(waterfalls[0]) if waterfalls else ()),

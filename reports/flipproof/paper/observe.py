@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from flipproof.frame.solvers import Made, Missing
+from flipproof.frame.solvers import Missing, RunResult
 from flipproof.paper.cases import family
 from slicemodel import Trajectory
 from slicemodel.observables import PLATEAU_SHARE, plateau, plateau_of_points, plateau_of_width
@@ -35,7 +35,7 @@ class CaseFlights:
     """
 
     solver: str
-    made: Mapping[str, Made]
+    made: Mapping[str, RunResult]
     halved: CaseFlights | None = None
     half_steps: CaseFlights | None = None
     seen: dict[str, Trajectory] = field(default_factory=dict)

@@ -13,7 +13,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from flipproof.frame.flights import Call, Flights
-from flipproof.frame.solvers import Made, Run, make, solve
+from flipproof.frame.solvers import Run, RunResult, make, solve
 from flipproof.paper import observe
 from flipproof.paper.cases import ICE, Case, all_cases, family, numbers, paper_steps, paper_throw
 from ode_reference.models import LADDER
@@ -70,7 +70,7 @@ class Planned:
 class PaperRuns:
     """Every planned run of the paper's figures and statements by its name, and costs if they were asked for."""
 
-    made: Mapping[Name, Made]
+    made: Mapping[Name, RunResult]
     costs: tuple[Cost, ...] = ()
 
     @classmethod
@@ -85,7 +85,7 @@ class PaperRuns:
     def flights(self, solver: str) -> observe.CaseFlights:
         """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
 
-        def of(wanted: Half) -> dict[str, Made]:
+        def of(wanted: Half) -> dict[str, RunResult]:
             return {key: result for (by, key, half), result in self.made.items() if by == solver and half == wanted}
 
         usual = of("")
@@ -157,12 +157,12 @@ def cost_calls() -> list[Call]:
     return [published, *others]
 
 
-def make_group(group: Iterable[Planned]) -> dict[Name, Made]:
+def make_group(group: Iterable[Planned]) -> dict[Name, RunResult]:
     """Make runs one after the other and keep of each what is looked at."""
     return {plan.name: _kept(make(plan.run), plan) for plan in group}
 
 
-def _kept(result: Made, planned: Planned) -> Made:
+def _kept(result: RunResult, planned: Planned) -> RunResult:
     """Return a run with what is kept of it: slices at every time are nearly all of its memory."""
     run = result.trajectory
     if run is None:

@@ -21,7 +21,7 @@ from typing import Any, Final
 from flipproof.frame.processes import NoWorkersError
 from flipproof.frame.store import Entry, Store, json_of
 from flipproof.sweep.errors import SweepError
-from flipproof.sweep.work import Made, Point, Row, Throw, code_identity, keyed, make_points, together, versions
+from flipproof.sweep.work import Point, Row, Throw, WorkerResult, code_identity, keyed, make_points, together, versions
 
 Chunk = list[tuple[bytes, Point]]
 """Keys and points of one kind."""
@@ -58,8 +58,8 @@ def fill(
     code, counts = code_identity(), Counter[str]()
     made_now, lost, suspects = 0, 0, set[bytes]()
     again: list[Chunk] = []
-    flying: dict[Future[Made], Chunk] = {}
-    done: queue.SimpleQueue[Future[Made]] = queue.SimpleQueue()
+    flying: dict[Future[WorkerResult], Chunk] = {}
+    done: queue.SimpleQueue[Future[WorkerResult]] = queue.SimpleQueue()
 
     def count(rows: Iterable[Row]) -> None:
         statuses = [str(row["status"]) for row in rows]
@@ -101,7 +101,7 @@ def fill(
                 again.append(chunk)
                 continue
             words = f"the worker died twice with this point alone in it ({error})"
-            result = Made(code, versions(), [{"status": "worker-died", "reason": words}])
+            result = WorkerResult(code, versions(), [{"status": "worker-died", "reason": words}])
         if result.changed:
             words = f"the files of {result.changed} are not those that the sweep was begun with; begin it again"
             raise SweepError(f"{words}, which keeps the rows that are there")
@@ -124,7 +124,7 @@ def _row(shared: Any, answer: bytes) -> Row:
     return dict(zip(shared["columns"], json.loads(answer), strict=True))
 
 
-def _entries(chunk: Chunk, result: Made, base: Throw) -> list[Entry]:
+def _entries(chunk: Chunk, result: WorkerResult, base: Throw) -> list[Entry]:
     """Return the rows of a chunk as entries: what differs from the base throw stands beside each."""
     first = chunk[0][1]
     facts = {

@@ -93,7 +93,7 @@ class Point(NamedTuple):
     content: str = ""
 
 
-class Made(NamedTuple):
+class WorkerResult(NamedTuple):
     """What a worker returns: the code and versions that it ran, and the rows of its points.
 
     ``changed`` names somebody else's solver whose files are not those of the points; then there are no rows.
@@ -154,16 +154,16 @@ def versions() -> Mapping[str, str]:
     return {name: version for name, version in versions_of().items() if name != "flipproof"} | machine
 
 
-def make_points(code: str, points: Sequence[Point]) -> Made:
+def make_points(code: str, points: Sequence[Point]) -> WorkerResult:
     """Make points of one kind in this process, or none if the caller's ``code``, or the solver's, is another here."""
     own, first = code_identity(), points[0]
     if own != code or _changed(first):
-        return Made(own, versions(), (), _changed(first))
+        return WorkerResult(own, versions(), (), _changed(first))
     module, _, name = first.maker.partition(":")
     throws = [point.throw for point in points]
     rows = getattr(import_module(module), name)(first.solver, first.settings, throws, **first.options)
     changed = _changed(first)  # while they were made, too: then nobody knows by which
-    return Made(own, versions(), () if changed else rows, changed)
+    return WorkerResult(own, versions(), () if changed else rows, changed)
 
 
 def _changed(point: Point) -> str:

@@ -15,7 +15,7 @@ from flipproof.frame.findings import Finding
 from flipproof.frame.flights import Call, ChapterError, attempt
 from flipproof.frame.gather import evaluate, gather
 from flipproof.frame.pool import SerialExecutor
-from flipproof.frame.solvers import Made, Missing, Run
+from flipproof.frame.solvers import Missing, Run, RunResult
 from slicemodel import Scenario, Trajectory
 
 THROW = Scenario(n_slices=2)
@@ -27,7 +27,7 @@ LOST = Run("eq8", THROW, {"rtol": 1e-3}, "the lost one")
 def fly(run, omega=10.0):
     """Make a run up, but for the lost one."""
     if run == LOST:
-        return Made(run, None, 0.0, "RuntimeError: no luck")
+        return RunResult(run, None, 0.0, "RuntimeError: no luck")
     t = np.linspace(0.0, THROW.duration, 3)
     none = np.zeros((0, 2))
     flat = np.full(3, omega)
@@ -35,7 +35,7 @@ def fly(run, omega=10.0):
         scenario=run.scenario, solver="made-up", method=run.solver, t=t, theta=t, omega=flat, r=none, v=none,
         r_cm=np.full(3, 0.1), inertia=np.ones(3),
     )  # fmt: skip
-    return Made(run, flight, 0.1)
+    return RunResult(run, flight, 0.1)
 
 
 def value(id_, number, kind="observation"):
@@ -87,7 +87,7 @@ def gathered():
 
 def test_a_study_may_ask_for_more_after_it_has_seen(gathered):
     _, found = gathered
-    assert found.found("waves") == (10.0, 7)
+    assert found.result("waves") == (10.0, 7)
     assert list(found.stages.seconds) == ["runs, wave 1", "studies", "runs, wave 2"]
 
 

@@ -176,8 +176,8 @@ def agreement_on(
     if equation in trajectories:
         bands[equation] = flights.answer(own_band)
     witness = attempt(band_over_time, runs[SOLVE_IVP], coarser, flights)
-    if SOLVE_IVP in trajectories and witness.found is not None:
-        bands[SOLVE_IVP] = witness.found
+    if SOLVE_IVP in trajectories and witness.result is not None:
+        bands[SOLVE_IVP] = witness.result
     certificates = [
         trajectories[name].diagnostics["certificate"] for name in bands if name not in (equation, SOLVE_IVP)
     ]

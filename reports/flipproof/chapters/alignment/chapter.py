@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from flipproof.curves.events import IndexArray, closest
 from flipproof.curves.tube import Held, hold
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, known, observed
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, observed, results_of
 from flipproof.frame.solvers import Missing
 from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
@@ -173,19 +173,19 @@ def study(ask: Ask) -> Study[Pairs]:
 def claims(results: Pairs) -> Claims:
     """Yield the share of the time that each second curve spends in the tube around the first: early is no failure."""
     for (first, second), (aligned, tube) in results.items():
-        if tube.found is None:
+        if tube.result is None:
             yield Absent(f"tube-{first}-{second}", f"tube of {first} and {second}", tube.reason, "observation")
         else:
-            (held, words), title = tube.found, f"{second} in the tube around {first}: share of the time"
+            (held, words), title = tube.result, f"{second} in the tube around {first}: share of the time"
             yield observed(f"tube-{first}-{second}", title, held.share, "", words)
-        if aligned.found is None:
+        if aligned.result is None:
             title = f"alignment of {first} and {second}"
             yield Absent(f"alignment-{first}-{second}", title, aligned.reason, "observation")
 
 
 def figures(results: Pairs) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
-    for (first, second), alignment in known({pair: aligned for pair, (aligned, _) in results.items()}).items():
+    for (first, second), alignment in results_of({pair: aligned for pair, (aligned, _) in results.items()}).items():
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",

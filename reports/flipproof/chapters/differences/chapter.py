@@ -34,7 +34,7 @@ from flipproof.frame.chapter import (
 )
 from flipproof.frame.equations import NAMES
 from flipproof.frame.findings import Rule
-from flipproof.frame.flights import Flights, attempt, known
+from flipproof.frame.flights import Flights, attempt, results_of
 from flipproof.frame.solvers import finer
 from flipproof.frame.twins import BAND_WORDS, omega_band_call
 from flipproof.output.columns import curves_csv
@@ -128,7 +128,7 @@ def study(ask: Ask) -> Study[Differences]:
         )
 
     outcomes = {pair: attempt(compared, *pair) for pair in pairs if set(pair[1:]) <= set(runs)}
-    differences = tuple(known(outcomes).values())
+    differences = tuple(results_of(outcomes).values())
     free, ended = flown.get(FREE), ""
     if free is not None and not free.ok:
         ended = f"up to t = {1e3 * free.t[-1]:.0f} ms, where {free.method} {free.status}"
@@ -156,7 +156,7 @@ def run_bands(runs: Mapping[str, Run], calls: Mapping[str, Call], flights: Fligh
     band is zero. For a model it is that of its twins, for an engine that of its certificate.
     """
     bands = dict.fromkeys(SCHEMES, 0.0)
-    for model, result in known({model: attempt(flights.answer, call) for model, call in calls.items()}).items():
+    for model, result in results_of({model: attempt(flights.answer, call) for model, call in calls.items()}).items():
         bands[model] = float(result[-1])
     flown = flights.trajectories(runs)
     certified = {name: flown[name].diagnostics.get("certificate", {}) for name in WITNESSES if name in flown}

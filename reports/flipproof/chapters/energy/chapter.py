@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Study, judged, regression
-from flipproof.frame.flights import Outcome, attempt, known
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.flights import Outcome, attempt, results_of
+from flipproof.frame.solvers import Run, RunResult
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 
@@ -15,7 +15,7 @@ from slicemodel import Trajectory
 class Energy(NamedTuple):
     """Every model's flight of the paper's own throw, and its ledger on the report's."""
 
-    checks: Mapping[str, Made]
+    checks: Mapping[str, RunResult]
     ledgers: Mapping[str, Outcome[Mapping[str, float]]]
 
 
@@ -42,7 +42,7 @@ def claims(results: Energy) -> Claims:
         id_, title = f"energy-{model}", f"{model}: the energy ledger closes"
         yield judged(closes, id_, title, result, id=id_, title=title)
     for model, outcome in results.ledgers.items():
-        if outcome.found is None:
+        if outcome.result is None:
             yield Absent(f"ledger-{model}", f"ledger of {model}", outcome.reason, "observation")
 
 
@@ -52,5 +52,5 @@ CHAPTER: Final = Chapter(
     study,
     claims,
     kind="regression",
-    page=lambda results: {"made": known(results.ledgers)},
+    page=lambda results: {"made": results_of(results.ledgers)},
 )

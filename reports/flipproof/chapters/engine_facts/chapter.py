@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from flipproof.chapters.solvers import ENGINE
 from flipproof.curves.ensemble import claim_change, largest_change
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, judged
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Run, RunResult, Study, judged
 from flipproof.frame.findings import finite_or_none, regression
 from flipproof.frame.solvers import Missing, without_gravity
 from flipproof.output.columns import rows_csv
@@ -48,9 +48,9 @@ class EngineFact:
     id: str
     unit: str
     admissible: tuple[float, float]
-    measure: Callable[[Mapping[str, Made]], tuple[float, str]]
+    measure: Callable[[Mapping[str, RunResult]], tuple[float, str]]
 
-    def finding(self, made: Mapping[str, Made]) -> Finding:
+    def finding(self, made: Mapping[str, RunResult]) -> Finding:
         """Return the finding: that the number lies in its interval, or why there is none.
 
         A fact about an engine that is not installed and need not be cannot fail.
@@ -87,13 +87,13 @@ def plan_engine_facts(throw: Scenario) -> dict[str, Run]:
     return {words: Run("pymunk", throws[words], usual | changes[words], f"engine fact, {words}") for words in changes}
 
 
-def _gravity(results: Mapping[str, Made]) -> tuple[float, str]:
+def _gravity(results: Mapping[str, RunResult]) -> tuple[float, str]:
     usual, without = results["usual"].whole, results["no gravity"].whole
     fallen = 0.5 * usual.scenario.gravity * float(usual.t[-1]) ** 2
     return largest_change(usual, without), f"the bottle falls by {fallen:.2f} m meanwhile"
 
 
-def _smaller_step(results: Mapping[str, Made]) -> tuple[float, str]:
+def _smaller_step(results: Mapping[str, RunResult]) -> tuple[float, str]:
     held = []
     for dt in (LONG_DT, SHORT_DT):
         run = results[f"few iterations, dt {dt:g} s"].flight
@@ -105,24 +105,24 @@ def _smaller_step(results: Mapping[str, Made]) -> tuple[float, str]:
     return (short / long if long else math.nan), note
 
 
-def _widest(results: Mapping[str, Made], iterations: int) -> float:
+def _widest(results: Mapping[str, RunResult], iterations: int) -> float:
     """Return the largest change of omega by another order."""
     usual, *others = (results[f"order {seed}, {iterations} iterations"].whole for seed in (0, *SHUFFLES))
     return max(largest_change(usual, other) for other in others)
 
 
-def _order(results: Mapping[str, Made]) -> tuple[float, str]:
+def _order(results: Mapping[str, RunResult]) -> tuple[float, str]:
     again = largest_change(results["usual"].whole, results[f"order 0, {MANY} iterations"].whole)
     return _widest(results, FEW), f"{len(SHUFFLES)} shuffled orders; the same order twice: {again:.1g}"
 
 
-def _order_forgotten(results: Mapping[str, Made]) -> tuple[float, str]:
+def _order_forgotten(results: Mapping[str, RunResult]) -> tuple[float, str]:
     few, many = _widest(results, FEW), _widest(results, MANY)
     note = f"{few:.1e} to {many:.1e} of ω₀: what the order moves is what the solver has not iterated away"
     return many / few, note
 
 
-def _joints(results: Mapping[str, Made]) -> tuple[float, str]:
+def _joints(results: Mapping[str, RunResult]) -> tuple[float, str]:
     default = results["joints corrected as by default"].whole.diagnostics["constraint_drift"]
     ours = results["usual"].whole.diagnostics["constraint_drift"]
     return float(default), f"{ours:.1e} with errors removed within one step"
@@ -249,18 +249,18 @@ def _mujoco_path(xml: str, *, speed: float, duration: float) -> Iterator[tuple[f
         yield float(data.qpos[0]), float(data.qvel[0])
 
 
-def _elasticity(_: Mapping[str, Made]) -> tuple[float, str]:
+def _elasticity(_: Mapping[str, RunResult]) -> tuple[float, str]:
     others = ", ".join(f"{a:g} and {b:g} give {rebound_of_two(a, b):.2f}" for a, b in ((1.0, 0.5), (0.0, 1.0)))
     return rebound_of_two(0.5, 0.5), others
 
 
-def _slop(_: Mapping[str, Made]) -> tuple[float, str]:
+def _slop(_: Mapping[str, RunResult]) -> tuple[float, str]:
     (default, left), without = depth_left(None), depth_left(0.0)[1]
     dropped = f"a disc dropped at 2 m/s (Δt = 10 ms) stays {left * 1e3:.1f} mm deep in the floor"
     return default, f"{dropped}, {without * 1e3:.1g} mm with slop 0"
 
 
-def _tunnel(_: Mapping[str, Made]) -> tuple[float, str]:
+def _tunnel(_: Mapping[str, RunResult]) -> tuple[float, str]:
     back = speed_through_wall(1e-3)
     note = f"5 m/s and a wall of 10 mm at Δt = 10 ms; at 1 ms it comes back, {back:.3g}"
     return speed_through_wall(1e-2), note

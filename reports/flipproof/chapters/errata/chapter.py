@@ -56,7 +56,7 @@ def study_errata(throw: Scenario) -> dict[str, Erratum]:
             raise Missing(f"ScenarioError: {error}") from error
 
     errata = {id_: attempt(evaluate, item) for id_, item in AUDIT.items()}
-    return {id_: outcome.found or Erratum(note=outcome.reason) for id_, outcome in errata.items()}
+    return {id_: outcome.result or Erratum(note=outcome.reason) for id_, outcome in errata.items()}
 
 
 def claims(results: Mapping[str, Erratum]) -> Claims:

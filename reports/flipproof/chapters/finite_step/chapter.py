@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from flipproof.chapters.solvers import LIMITS
-from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Run, Study, attempt, known, observed
+from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Run, Study, attempt, observed, results_of
 from flipproof.frame.solvers import finer
 from flipproof.frame.twins import omega_band_call
 from slicemodel import Trajectory
@@ -82,13 +82,13 @@ def study(ask: Ask) -> Study[StepCosts]:
     more = {way: (finer(run), finer(truth)) for way, (run, truth) in pairs.items()}
     calls = {truth: omega_band_call(truth) for _, truth in pairs.values()}
     flights = yield [*(run for both in (*pairs.values(), *more.values()) for run in both), *calls.values()]
-    bands = known({truth: attempt(flights.answer, call) for truth, call in calls.items()})
+    bands = results_of({truth: attempt(flights.answer, call) for truth, call in calls.items()})
 
     def costs(of: dict[Way, tuple[Run, Run]]) -> tuple[StepCost, ...]:
         pairs = ((cost_of(way, flights[run].whole, flights[truth].whole), truth) for way, (run, truth) in of.items())
         return tuple(replace(cost, band=float(bands[truth][-1]) if truth in bands else None) for cost, truth in pairs)
 
-    return StepCosts(costs(pairs), attempt(costs, more).found or (), ask.throw.n_slices)
+    return StepCosts(costs(pairs), attempt(costs, more).result or (), ask.throw.n_slices)
 
 
 def cost_of(way: Way, run: Trajectory, reference: Trajectory) -> StepCost:

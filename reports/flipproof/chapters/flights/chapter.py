@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from engine_check.engines import ENGINES
 from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES, Guest
 from flipproof.figures.style import new_figure, shared_legend, shown_name, solver_style, styled
-from flipproof.frame.chapter import Ask, Chapter, Exhibit, Made, Study, Touch
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, RunResult, Study, Touch
 from flipproof.frame.solvers import find
 from flipproof.output.columns import curves_csv, json_ready
 from flipproof.output.motion import motion_data
@@ -33,7 +33,7 @@ class Flown(NamedTuple):
     """What became of every solver on the throw, by its name."""
 
     throw: Scenario
-    made: Mapping[str, Made]
+    made: Mapping[str, RunResult]
     guests: Mapping[str, Guest] = MappingProxyType({})
 
     @property
@@ -71,7 +71,7 @@ def study(ask: Ask) -> Study[Flown]:
     return Flown(ask.throw, {name: flights[ask.solvers[name]] for name in names}, ask.guests)
 
 
-def solver_row(name: str, made: Made) -> dict[str, Any]:
+def solver_row(name: str, made: RunResult) -> dict[str, Any]:
     """Return what a report says of one solver."""
     solver, run = find(made.run.solver), made.trajectory
     row: dict[str, Any] = {"name": name, "package": solver.package, "equation": solver.equation}

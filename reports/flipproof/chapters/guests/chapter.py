@@ -26,13 +26,13 @@ def claims(found: Sequence[Visit]) -> Claims:
     for visit in found:
         guest = visit.guest
         head, label = f"guest-{guest.slug}", guest.label
-        if visit.certificate.found is not None:
-            yield from findings_of(visit.certificate.found, f"{head}-certify-", f"{label}: ")
+        if visit.certificate.result is not None:
+            yield from findings_of(visit.certificate.result, f"{head}-certify-", f"{label}: ")
         for name, reason in visit.problems.items():
             idle = name == "waterfall" or (name == "certificate" and guest.curve)
             name = name.removeprefix(f"{label}, ").replace(" ", "-")
             yield Absent(f"{head}-{name}-missing", f"{label}: {name}", reason, "observation" if idle else "regression")
-        if (waterfall := visit.waterfall.found) is not None:
+        if (waterfall := visit.waterfall.result) is not None:
             rest, *bars = waterfall.bars
             parts = ", ".join(f"{bar.name} {bar.average:+.3g}" for bar in bars) or "none"
             title = f"{label}: mean of ω/ω₀ over the second half, free flight minus it"
@@ -55,7 +55,7 @@ def figures(found: Sequence[Visit]) -> Iterator[Exhibit]:
     if refined := [visit for visit in found if len(visit.refined) > 1]:
         yield _draw_convergence(refined)
     for visit in found:
-        if (waterfall := visit.waterfall.found) is not None:
+        if (waterfall := visit.waterfall.result) is not None:
             bars = ", ".join(f"{bar.name} {bar.average:+.3f}" for bar in waterfall.bars)
             yield Exhibit(
                 name=f"guest-{visit.guest.slug}-waterfall",
@@ -111,7 +111,7 @@ def figure_convergence(visits: Sequence[Visit]) -> Figure:
 
 def summarise(visit: Visit) -> dict[str, Any]:
     """Return a guest as JSON-ready data."""
-    guest, certificate, waterfall = visit.guest, visit.certificate.found, visit.waterfall.found
+    guest, certificate, waterfall = visit.guest, visit.certificate.result, visit.waterfall.result
     split: Mapping[str, Any] | None = None
     if waterfall is not None:
         rest, *bars = waterfall.bars

@@ -86,7 +86,7 @@ class Visit:
     @property
     def refined(self) -> list[Effort]:
         """The efforts that were made, the coarsest first."""
-        return [outcome.found for outcome in self.efforts.values() if outcome.found is not None]
+        return [outcome.result for outcome in self.efforts.values() if outcome.result is not None]
 
 
 def study(ask: Ask) -> Study[tuple[Visit, ...]]:
@@ -118,7 +118,7 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
                 efforts={run.name: attempt(effort_of, run, rungs.get(equation), flights) for run in runs},
                 rise=rise_of(flight) if flight is not None and len(flight.v) == len(flight.t) else None,
                 waterfall=Outcome(None, "" if flight is None else "what it declares is no equation of the ladder"),
-                placed=placed_on(guest, certificate.found, rungs, flight),
+                placed=placed_on(guest, certificate.result, rungs, flight),
             )
         )
     starts = {visit.guest: start for visit in visits if (start := start_of(visit)) is not None}
@@ -190,7 +190,7 @@ def start_of(visit: Visit) -> Switches | None:
 
     None if it did not fly, or if what it declares converges to no equation of the ladder.
     """
-    traits, certificate = visit.guest.traits, visit.certificate.found
+    traits, certificate = visit.guest.traits, visit.certificate.result
     if traits is not None and traits.equation is not None:
         try:
             return switches_of(traits.equation)

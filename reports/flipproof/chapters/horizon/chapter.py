@@ -173,7 +173,7 @@ def study_horizon(solver: str, own: bool, levels: Sequence[Level], flights: Flig
     return Horizon(
         solver=solver,
         own=own,
-        ensembles=tuple((level, outcome.found) for level, outcome in outcomes if outcome.found is not None),
+        ensembles=tuple((level, outcome.result) for level, outcome in outcomes if outcome.result is not None),
         problems=tuple(dict.fromkeys(outcome.reason for _, outcome in outcomes if outcome.reason)),
     )
 

@@ -20,8 +20,8 @@ from flipproof.frame.chapter import (
     Claims,
     Exhibit,
     Finding,
-    Made,
     Run,
+    RunResult,
     Study,
     judged,
     observed,
@@ -54,9 +54,9 @@ class Ice(NamedTuple):
     ``slugs`` are the guests' names in ids.
     """
 
-    rigid: Mapping[str, Made]
-    welded: Mapping[str, Made]
-    guests: Mapping[str, Made] = MappingProxyType({})
+    rigid: Mapping[str, RunResult]
+    welded: Mapping[str, RunResult]
+    guests: Mapping[str, RunResult] = MappingProxyType({})
     slugs: Mapping[str, str] = MappingProxyType({})
 
 

@@ -33,7 +33,7 @@ from flipproof.chapters.maps.study import (
 )
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt, known
+from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt, results_of
 from flipproof.frame.twins import BAND_WORDS
 from flipproof.output.columns import rows_csv
 from slicemodel.scenario import shortened
@@ -77,7 +77,7 @@ def study(ask: Ask) -> Study[Maps]:
 
     def mapped(axis: Axis) -> ValidityMap:
         # Cells of a chunk whose worker died stay "not run".
-        answers = [(call.arguments[0], attempt(flights.answer, call).found or ()) for call in calls[axis]]
+        answers = [(call.arguments[0], attempt(flights.answer, call).result or ()) for call in calls[axis]]
         readings = {run: reading for chunk, answer in answers for run, reading in zip(chunk, answer, strict=False)}
         return study_readings(cut, axis, *ends[axis], readings, steps=ask.steps)
 
@@ -87,13 +87,13 @@ def study(ask: Ask) -> Study[Maps]:
 def claims(found: Maps) -> Claims:
     """Yield which map could not be made."""
     for axis, outcome in found.items():
-        if outcome.found is None:
+        if outcome.result is None:
             yield Absent(f"map-{axis}", f"map over {axis}", outcome.reason, "observation")
 
 
 def figures(found: Maps) -> Iterator[Exhibit]:
     """Yield every map."""
-    yield from map(_exhibit, known(found).values())
+    yield from map(_exhibit, results_of(found).values())
 
 
 def _exhibit(study: ValidityMap) -> Exhibit:

@@ -22,7 +22,7 @@ from flipproof.chapters.solvers import FREE, LIMITS, SCHEMES
 from flipproof.chapters.waterfall.study import STEP, mended
 from flipproof.frame.equations import NAMES, canonical
 from flipproof.frame.shapley import fair_shares
-from flipproof.frame.solvers import Made, Run, make
+from flipproof.frame.solvers import Run, RunResult, make
 from flipproof.frame.twins import band, twins
 from ode_reference.models import LADDER as MODELS
 from ode_reference.models import MODELS as EQUATIONS
@@ -259,7 +259,7 @@ def place_of(throw: Scenario, axis: Axis, steps: int) -> tuple[float, float]:
     return throw.fill_fraction, values[axis]
 
 
-def read_flight(made: Made) -> Reading:
+def read_flight(made: RunResult) -> Reading:
     """Return what a map needs of one run."""
     flight = made.trajectory
     if flight is None:

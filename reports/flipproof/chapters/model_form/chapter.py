@@ -23,7 +23,7 @@ from scipy.stats import f as f_distribution
 from flipproof.chapters.step_size.chapter import errors_of, plan_step_size
 from flipproof.curves.order import ROUND_OFF
 from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Finding, Study, judged, observed
-from flipproof.frame.flights import Call, Outcome, attempt, known
+from flipproof.frame.flights import Call, Outcome, attempt, results_of
 from flipproof.frame.solvers import Run
 from slicemodel.trajectory import FloatArray
 
@@ -302,7 +302,7 @@ def study(ask: Ask) -> Study[Results]:
         return richardson(steps, ends)
 
     calls = {pair: attempt(fit, *pair) for pair in ask.work}
-    flights = yield known(calls).values()
+    flights = yield results_of(calls).values()
     forms = {pair: attempt(lambda call: flights.answer(call.value), call) for pair, call in calls.items()}
     return forms, {scheme: attempt(limit, scheme) for scheme in levels}
 
@@ -338,5 +338,5 @@ CHAPTER: Final = Chapter(
     study=study,
     claims=claims,
     work={"quick": FORMS[:2], "full": FORMS},
-    page=lambda results: {"fits": list(known(results[0]).items())},
+    page=lambda results: {"fits": list(results_of(results[0]).items())},
 )

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from flipproof.chapters.ice.chapter import measure
 from flipproof.chapters.maps.study import vary
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
-from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Made, Run, Study, observed, regression
+from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Run, RunResult, Study, observed, regression
 from flipproof.output.columns import columns_csv
 from ode_reference.solver import COLUMN, RODS
 from slicemodel import Scenario, Trajectory
@@ -86,10 +86,10 @@ def plan_overlap(throw: Scenario, fills: Sequence[float], slices: int, dt: float
     }
 
 
-def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], made: Mapping[Run, Made]) -> Overlap:
+def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], made: Mapping[Run, RunResult]) -> Overlap:
     """Read the runs that ``plan_overlap`` planned over these fill fractions."""
 
-    def read(result: Made) -> tuple[float, str]:
+    def read(result: RunResult) -> tuple[float, str]:
         """Return the plateau of a run, or NaN and why it cannot be used."""
         flight = result.trajectory
         if flight is None:

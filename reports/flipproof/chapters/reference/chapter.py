@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from flipproof.curves.ensemble import claim_change
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Run, RunResult, Study, judged
 from flipproof.frame.twins import usual_rest_speed
 from ode_reference.bands import CUT
 from ode_reference.models import LADDER
@@ -18,7 +18,7 @@ BAND: Final = 1e-7
 CROSS_CHECKED: Final = ("published-limit", "eq8")
 """Models that a second integration method is held against."""
 
-Results = Mapping[str, list[Made]]
+Results = Mapping[str, list[RunResult]]
 """Model -> its flight of the paper's own throw: as it is, by the witness, and by a second method if asked for."""
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, shared_legend, styled
-from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt, known
+from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt, results_of
 from flipproof.output.columns import curves_csv
 from slicemodel import Trajectory
 
@@ -39,7 +39,7 @@ def study(ask: Ask) -> Study[Results]:
         for scheme in SCHEMES
     }
     flights = yield [run for cuts in runs.values() for run in cuts]
-    return known(
+    return results_of(
         {scheme: attempt(lambda cuts: compare(*flights.levels([cuts])), cuts) for scheme, cuts in runs.items()}
     )
 

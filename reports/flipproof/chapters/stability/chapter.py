@@ -25,7 +25,7 @@ from flipproof.curves.ensemble import largest_change
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Exhibit, Finding, Study, attempt, observed, regression
 from flipproof.frame.flights import Flights
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Run, RunResult
 from flipproof.frame.twins import omega_band_call
 from flipproof.output.columns import rows_csv
 from slicemodel import Scenario, Trajectory
@@ -176,14 +176,14 @@ def plan_panel(throw: Scenario, layout: Layout, mass_ratio: float, slices: int) 
 
 def read_panel(panel: Panel, flights: Flights, band: float) -> Panel:
     """Return the panel with its cells."""
-    truth = attempt(lambda: flights[panel.reference].whole).found
+    truth = attempt(lambda: flights[panel.reference].whole).result
     dear = f"more than {panel.layout.budget:.1e} slices × iterations × steps"
     places = [(row, column) for row in range(len(panel.layout.iterations)) for column in range(len(panel.layout.dt))]
     cells = {at: cell_of(flights[panel.runs[at]], truth) if at in panel.runs else Cell(reason=dear) for at in places}
     return replace(panel, cells=cells, band=band)
 
 
-def cell_of(made: Made, truth: Trajectory | None) -> Cell:
+def cell_of(made: RunResult, truth: Trajectory | None) -> Cell:
     """Return what became of a run; one that is whole is held against the reference."""
     flight = made.trajectory
     if flight is None:
@@ -204,7 +204,7 @@ def study(ask: Ask) -> Study[tuple[Panel, ...]]:
     runs.sort(key=lambda run: -run.scenario.n_slices * run.settings["iterations"] / run.settings["dt"])
     calls = [omega_band_call(panel.reference) for panel in panels]
     flights = yield [*(panel.reference for panel in panels), *runs, *calls]
-    bands = [attempt(flights.answer, call).found for call in calls]
+    bands = [attempt(flights.answer, call).result for call in calls]
     return tuple(
         read_panel(panel, flights, math.nan if band is None else float(band[-1]))
         for panel, band in zip(panels, bands, strict=True)

@@ -34,7 +34,7 @@ from flipproof.frame.chapter import (
     observed,
     regression,
 )
-from flipproof.frame.flights import Flights, Outcome, attempt, known
+from flipproof.frame.flights import Flights, Outcome, attempt, results_of
 from flipproof.frame.solvers import Missing, Run
 from flipproof.output.columns import rows_csv
 from slicemodel import Scenario, Trajectory
@@ -164,12 +164,12 @@ def study(ask: Ask) -> Study[Orders]:
         for scheme in SCHEMES:
             truth = Run(LIMITS[scheme], throw)
             grids[part, scheme] = Outcome([[truth], *plan_step_size(throw, scheme, 37, multiple, levels)])
-    flights = yield chain.from_iterable(chain.from_iterable(known(grids).values()))
+    flights = yield chain.from_iterable(chain.from_iterable(results_of(grids).values()))
     for throw, _, levels, start, _ in plans:
         for scheme in SCHEMES:
             truth = Run(LIMITS[scheme], throw)
             grids[start, scheme] = attempt(_start, truth, flights, scheme, levels)
-    flights = yield chain.from_iterable(chain.from_iterable(known(grids).values()))
+    flights = yield chain.from_iterable(chain.from_iterable(results_of(grids).values()))
 
     def measured(outcome: Outcome[Grids]) -> StepSize:
         (truth,), *levels = flights.levels(outcome.value)
@@ -196,13 +196,13 @@ def claims(results: Orders) -> Claims:
             title = f"{scheme} converges to {LIMITS[scheme]}, {where}"
             yield judged(claim_order, results[where, scheme], where, id=id_, title=title)
         for where in (START, WHOLE):
-            if (where, scheme) in results and (measured := results[where, scheme].found) is not None:
+            if (where, scheme) in results and (measured := results[where, scheme].result) is not None:
                 yield claim_order(measured, where, kind="observation")
 
 
 def _measured(results: Orders, where: str) -> list[StepSize]:
     """Return the studies of a part that could be made."""
-    return [result for (part, _), result in known(results).items() if part == where]
+    return [result for (part, _), result in results_of(results).items() if part == where]
 
 
 def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Finding:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Made, Run, Study, judged, regression
+from flipproof.frame.chapter import Ask, Chapter, Claims, Finding, Run, RunResult, Study, judged, regression
 from slicemodel import Trajectory
 from slicemodel.vectors import Vector, deviations, load_all
 
 
-def study(ask: Ask) -> Study[list[tuple[Vector, Made]]]:
+def study(ask: Ask) -> Study[list[tuple[Vector, RunResult]]]:
     """Repeat every published run; these are throws of the paper, whatever the report's own is."""
     del ask
     vectors = load_all()
@@ -19,7 +19,7 @@ def study(ask: Ask) -> Study[list[tuple[Vector, Made]]]:
     return [(vector, flights[run]) for vector, run in zip(vectors, runs, strict=True)]
 
 
-def claims(results: list[tuple[Vector, Made]]) -> Claims:
+def claims(results: list[tuple[Vector, RunResult]]) -> Claims:
     """Yield the largest deviation of each run from what was printed."""
     for vector, result in results:
         title = f"output of the paper's program, {vector.name}"

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from flipproof.chapters.water.study import OWN_CELLS, own_fluid
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Run, RunResult
 from flipproof.paper.cases import family
 from flipproof.paper.experiment import OBSERVATIONS, compare
 from flipproof.paper.observe import CaseFlights
@@ -76,7 +76,7 @@ def _curve(filling: float, cells: int, suction: bool) -> list[float] | None:
     return None
 
 
-def _made(scenario: Scenario, curve: list[float]) -> Made:
+def _made(scenario: Scenario, curve: list[float]) -> RunResult:
     """Return a recorded curve as a flight without slices; theta is its integral by the rule of trapezia.
 
     Centre of mass and inertia are not recorded and stand as 0: the statements are about the turning alone.
@@ -97,4 +97,4 @@ def _made(scenario: Scenario, curve: list[float]) -> Made:
         r=empty,
         v=empty,
     )
-    return Made(Run("ideal-water", scenario), run, 0.0)
+    return RunResult(Run("ideal-water", scenario), run, 0.0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from flipproof.chapters.maps.study import vary
 from flipproof.figures.spoken import SPOKEN
-from flipproof.frame.chapter import Ask, Made, Run, Study
+from flipproof.frame.chapter import Ask, Run, RunResult, Study
 from ode_reference.solver import COLUMN, RODS
 from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
@@ -189,12 +189,12 @@ def _run(equation: str, filling: float, ask: Ask) -> Run:
     return Run(equation, throw, {"times": _times(ask)}, label)
 
 
-def _level(result: Made) -> float:
+def _level(result: RunResult) -> float:
     run = result.trajectory
     return float("nan") if run is None or not run.ok else plateau(run.t, run.omega, run.scenario.omega0)
 
 
-def _early(result: Made) -> float:
+def _early(result: RunResult) -> float:
     run = result.trajectory
     if run is None or not run.ok:
         return float("nan")
@@ -202,7 +202,7 @@ def _early(result: Made) -> float:
     return float(run.t[below[0]]) if below.size else float("nan")
 
 
-def _apart(result: Made, curve: list[float]) -> float:
+def _apart(result: RunResult, curve: list[float]) -> float:
     run = result.trajectory
     if run is None or not run.ok:
         return float("nan")

@@ -28,7 +28,7 @@ import numpy as np
 
 from flipproof.chapters.work_precision.contenders import Contender, Plan, common_times
 from flipproof.curves.order import ROUND_OFF, observed_order
-from flipproof.frame.solvers import Made, Run
+from flipproof.frame.solvers import Run, RunResult
 from flipproof.frame.timing import at_times
 from slicemodel import Scenario, Trajectory
 from slicemodel.schemes import SCHEMES
@@ -146,7 +146,7 @@ class WorkPrecision:
         return tuple(curve for curve in self.curves.values() if curve.contender.equation == equation)
 
 
-def study_work_precision(plan: Plan, made: Mapping[Run, Made]) -> WorkPrecision:
+def study_work_precision(plan: Plan, made: Mapping[Run, RunResult]) -> WorkPrecision:
     """Read the runs of a plan; raise Missing if one does not hold the common times."""
     references = {name: _reference([made[run] for run in runs]) for name, runs in plan.references.items()}
     curves = {}
@@ -158,7 +158,7 @@ def study_work_precision(plan: Plan, made: Mapping[Run, Made]) -> WorkPrecision:
     return WorkPrecision(throw=plan.throw, references=references, curves=curves)
 
 
-def _reference(runs: Sequence[Made]) -> Reference:
+def _reference(runs: Sequence[RunResult]) -> Reference:
     """Return what an equation's reference and its witnesses make."""
     if problem := _why_failed(runs):
         return Reference(reason=problem)
@@ -166,16 +166,16 @@ def _reference(runs: Sequence[Made]) -> Reference:
     return Reference(floor=max(ROUND_OFF, *(_error(witness, omega) for witness in runs[1:])), omega=omega)
 
 
-def _omega(result: Made) -> FloatArray:
+def _omega(result: RunResult) -> FloatArray:
     return np.asarray(result.flight.omega[at_times(result.flight.t, common_times(result.run.scenario))])
 
 
-def _error(result: Made, truth: FloatArray) -> float:
+def _error(result: RunResult, truth: FloatArray) -> float:
     """Return the largest error, as a fraction of omega_0."""
     return float(np.abs(_omega(result) - truth).max() / abs(result.run.scenario.omega0))
 
 
-def _why_failed(runs: Iterable[Made]) -> str:
+def _why_failed(runs: Iterable[RunResult]) -> str:
     """Return why the first run that failed cannot be used, or nothing."""
     for result in runs:
         if result.trajectory is None:
@@ -204,7 +204,7 @@ def work_of(trajectory: Trajectory) -> float:
     return _steps(trajectory) * slices * per_step
 
 
-def _point(members: Sequence[Made], reference: Reference) -> Point:
+def _point(members: Sequence[RunResult], reference: Reference) -> Point:
     flights = [result.trajectory for result in members]
     costs: dict[str, Any] = {
         "settings": " to ".join(_words(result.run.settings) for result in (members[0], *members[1:][-1:])),
