@@ -191,7 +191,7 @@ def test_the_keyboard_alone_works_the_player(player):
 
 def test_impact_buttons_stop_at_the_impacts_of_the_run(player, gathered):
     player.find("impacts-of").select_option("free-flight")
-    times = sorted({impact.time for impact in gathered.result("flights").made["free-flight"].trajectory.impacts})
+    times = sorted({impact.time for impact in gathered.result("flights").results["free-flight"].trajectory.impacts})
     player.find("next-impact").click()
     assert player.time == pytest.approx(times[0], abs=2e-6)
     assert "slice" in player.page.get_by_test_id("motion").inner_text()

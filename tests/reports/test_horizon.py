@@ -158,7 +158,7 @@ def test_a_solver_that_did_not_run_stays_with_its_reason():
 def test_the_figure_labels_band_sizes_and_horizons():
     steep = 1e-6 * np.exp(100 * T)
     studies = made_up(lambda label: steep if "release +1e-06" in label or "order" in label else 0.0)
-    studies.append(replace(studies[1], own=True))
+    studies.append(replace(studies[1], own_throw=True))
     figure = figure_horizon([*studies, studies[1]])
     assert [axes.get_title(loc="left") for axes in figure.axes[:3]] == [
         "pymunk",

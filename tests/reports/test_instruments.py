@@ -53,7 +53,7 @@ def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):
     assert "mujoco" not in poorer.result("certificates").certificates
     assert set(poorer.result("agreement")["free-flight"].names) == {"free-flight", "solve_ivp", *WITNESSES} - {"mujoco"}
     results = evaluate(poorer)
-    assert "RuntimeError: not installed" in poorer.result("flights").made["mujoco"].reason
+    assert "RuntimeError: not installed" in poorer.result("flights").results["mujoco"].reason
     assert not [finding.id for each in results.values() for finding in each.findings if finding.failed]
 
 

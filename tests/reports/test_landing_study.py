@@ -16,7 +16,7 @@ from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
 from flipproof.chapters.landing.chapter import chunks, claims
 from flipproof.chapters.landing.figures import figure_map, figures, map_csv, page, shares_csv, witnesses
-from flipproof.chapters.landing.single import land_throw, told
+from flipproof.chapters.landing.single import describe, land_throw
 from flipproof.chapters.landing.study import (
     AIMING,
     Key,
@@ -547,7 +547,7 @@ def test_land_says_touch_laws_and_certificate(capsys):
 def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
     rows = land_throw(THROW, Table(height=-0.3))
     lost = replace(rows[0].outcome, outcome="undecided", certified=None, margin=None, slid=None, reason="it is open")
-    assert "undecided: it is open" in told([replace(rows[0], outcome=lost)], Table(height=-0.3))
+    assert "undecided: it is open" in describe([replace(rows[0], outcome=lost)], Table(height=-0.3))
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def flight(scenario, curve, *, points=1001, theta=None, **told):
 def flown(runs, solver=PUBLISHED):
     """Return flights that were made, by their keys."""
     return CaseFlights(
-        solver=solver, made={key: RunResult(Run(solver, run.scenario), run, 0.0) for key, run in runs.items()}
+        solver=solver, results={key: RunResult(Run(solver, run.scenario), run, 0.0) for key, run in runs.items()}
     )
 
 
@@ -150,7 +150,7 @@ def test_what_a_judgement_looked_at_is_remembered():
     usual.run("filling 0.1")
     assert usual.flown == "N = 2"
     stepped = replace(flight(THROW.with_slices(50), FLAT), settings={"steps": 1000})
-    other = replace(usual, made=usual.made | flown({"filling 0.2": stepped}).made, seen={})
+    other = replace(usual, results=usual.results | flown({"filling 0.2": stepped}).results, seen={})
     other.at("filling", 0.1), other.at("filling", 0.2)
     assert other.flown == "N = 2 to 50, P = 1000"
 
@@ -486,7 +486,7 @@ def test_half_the_slices_give_the_band_and_tolerances_are_added():
 
 def test_a_missing_or_broken_flight_leaves_a_claim_undecided_and_says_why():
     failed = RunResult(Run("eq8", THROW, label="the tenth"), None, 0.0, "ValueError: no such bottle")
-    judgement = judge(BY_ID["tenth-slows"], CaseFlights(solver="eq8", made={"filling 0.1": failed}))
+    judgement = judge(BY_ID["tenth-slows"], CaseFlights(solver="eq8", results={"filling 0.1": failed}))
     assert judgement.verdict == "cannot be decided"
     assert judgement.words == "the tenth: ValueError: no such bottle"
     assert not judgement.marginal
@@ -599,7 +599,7 @@ def runs():
     tenth = paper_throw(0.1).with_slices(50)
     runs["free-flight", "filling 0.1", ""] = make(Run("free-flight", tenth, label="tenth"))
     assert not [each.reason for each in runs.values() if each.trajectory is None]
-    return PaperRuns(made=runs)
+    return PaperRuns(results=runs)
 
 
 @pytest.fixture(scope="module")
@@ -671,8 +671,8 @@ def test_weight_is_what_slows_the_bottle_filled_to_a_tenth(runs):
     assert found["free-flight"].value == pytest.approx(0.88, abs=0.01)
     assert found["eq8-weightless"].value == pytest.approx(0.88, abs=0.01)
     assert found[PUBLISHED].value == pytest.approx(0.63, abs=0.005)
-    program = runs.made[PUBLISHED, "filling 0.1", ""]
-    swapped = PaperRuns(made={("free-flight", "filling 0.1", ""): program})
+    program = runs.results[PUBLISHED, "filling 0.1", ""]
+    swapped = PaperRuns(results={("free-flight", "filling 0.1", ""): program})
     assert claim_weight_slows_the_tenth(swapped, "free-flight").failed
     assert claim_weight_slows_the_tenth(swapped, "eq8-weightless").verdict == "not evaluated"
 
@@ -682,7 +682,7 @@ def test_free_flight_does_not_know_where_down_is():
         ("free-flight", case.key, ""): make(Run("free-flight", case.scenario.with_slices(5), label=case.key))
         for case in family("angle")
     }
-    flights = PaperRuns(made=made).flights("free-flight")
+    flights = PaperRuns(results=made).flights("free-flight")
     angle, drop = judge(BY_ID["release-angle"], flights), judge(BY_ID["drop-later"], flights)
     assert (angle.verdict, drop.verdict) == ("holds", "fails")
     assert angle.deciding.value < 1e-9

@@ -30,7 +30,7 @@ def flights(level_of, *, ice=1.0, climb=0.0, lands=360.0):
     runs = {case.key: flight(case.scenario, level_of(case.value), climb, lands) for case in family("filling")}
     runs[ICE] = flight(paper_throw(), ice)
     made = {key: RunResult(Run(PUBLISHED, run.scenario), run, 0.0) for key, run in runs.items()}
-    return CaseFlights(solver=PUBLISHED, made=made)
+    return CaseFlights(solver=PUBLISHED, results=made)
 
 
 def experimental(filling):
@@ -132,7 +132,7 @@ def test_the_equation_that_agrees_most_often_is_the_closest_overall():
 
 
 def test_a_missing_flight_is_no_number_and_says_why():
-    found = compare(BY_ID["five-times"], CaseFlights(solver="eq8", made={}))
+    found = compare(BY_ID["five-times"], CaseFlights(solver="eq8", results={}))
     assert found.verdict == "cannot be decided"
     assert found.note == "'filling 0.05' was not flown by eq8"
     mapping = comparison(found, reading(0.7), reading(0.8)).to_mapping()

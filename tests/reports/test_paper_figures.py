@@ -140,8 +140,8 @@ def test_a_bottle_about_to_topple_has_its_centre_right_above_the_rim(runs):
 
 def test_a_missing_flight_leaves_a_gap_and_its_reason(runs):
     lost = ("free-flight", "filling 0.25", "")
-    made = {**runs.made, lost: replace(runs.made[lost], trajectory=None, reason="ValueError: no")}
-    broken = replace(runs, made=made)
+    made = {**runs.results, lost: replace(runs.results[lost], trajectory=None, reason="ValueError: no")}
+    broken = replace(runs, results=made)
     assert broken.failures() == ["free-flight, filling 0.25: ValueError: no"]
     tables = [exhibit.table for exhibit in exhibits_paper(broken)]
     assert len(tables) == len(ORDER) + 1
@@ -216,6 +216,6 @@ def test_the_command_writes_figures_numbers_and_a_page(tmp_path, capsys, read_pa
 
 def test_a_failed_flight_is_on_the_page(runs):
     lost = ("eq8", "filling 0.25", "")
-    made = {**runs.made, lost: replace(runs.made[lost], trajectory=None, reason="ValueError: <no>")}
-    page = paper_figures.render_gallery([], replace(runs, made=made), {})
+    made = {**runs.results, lost: replace(runs.results[lost], trajectory=None, reason="ValueError: <no>")}
+    page = paper_figures.render_gallery([], replace(runs, results=made), {})
     assert "eq8, filling 0.25: ValueError: &lt;no&gt;" in page

@@ -52,7 +52,7 @@ def exhibits_of(gathered):
 
 
 def flights_of(gathered):
-    return [gathered.result("flights").made[name].trajectory for name in FLIGHTS]
+    return [gathered.result("flights").results[name].trajectory for name in FLIGHTS]
 
 
 def test_every_claim_is_evaluated_and_holds(gathered):

@@ -107,7 +107,7 @@ def test_by_plateau_rods_come_nearest_and_overlap_is_worst_in_a_full_bottle(foun
 def test_our_own_fluid_is_held_against_what_the_text_says_of_real_bottles():
     for suction in (False, True):
         recorded = flights(suction=suction)
-        assert recorded.made.keys() == recorded.halved.made.keys() == {case.key for case in family("filling")}
+        assert recorded.results.keys() == recorded.halved.results.keys() == {case.key for case in family("filling")}
         # Nothing moves in a full bottle: it turns on.
         full = recorded.at("filling", 1.0)
         assert full.theta[-1] == pytest.approx(full.scenario.theta0 + full.scenario.omega0 * full.t[-1], abs=1e-3)

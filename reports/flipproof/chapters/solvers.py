@@ -43,7 +43,7 @@ FLIGHTS: Final = (*(name for scheme in SCHEMES for name in (scheme, LIMITS[schem
 """The solvers whose flights are drawn."""
 
 OTHER_SCHEMES: Final = tuple(name for name in schemes.SCHEMES if name not in SCHEMES)
-OTHERS: Final = (
+OTHER_SOLVERS: Final = (
     *OTHER_SCHEMES,
     *(model for model in LADDER if model not in FLIGHTS),
     *(name for name in WITNESSES if name not in FLIGHTS),
@@ -122,8 +122,8 @@ class Guest:
         declared = self.traits.equation if self.traits is not None else None
         if declared in LADDER or flight is None:
             return declared if declared in LADDER else ""
-        off = {rung: np.interp(flight.t, run.t, run.omega) - flight.omega for rung, run in ladder.items()}
-        return min(off, key=lambda rung: float(np.max(np.abs(off[rung]))), default="")
+        deviations = {rung: np.interp(flight.t, run.t, run.omega) - flight.omega for rung, run in ladder.items()}
+        return min(deviations, key=lambda rung: float(np.max(np.abs(deviations[rung]))), default="")
 
 
 def invited(specs: Sequence[str], timeout: float | None = None) -> tuple[Guest, ...]:

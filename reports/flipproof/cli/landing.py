@@ -83,7 +83,7 @@ def _add_table(command: argparse.ArgumentParser) -> None:
 def command_land(options: argparse.Namespace) -> int:
     """Throw one bottle on a table and say how it lands."""
     throw = read_scenario(options.scenario, options.slices)
-    from flipproof.chapters.landing.single import land_throw, told
+    from flipproof.chapters.landing.single import describe, land_throw
     from flipproof.chapters.landing.study import standing
     from flipproof.chapters.landing.throws import aimed
     from flipproof.frame.beside import beside
@@ -99,7 +99,7 @@ def command_land(options: argparse.Namespace) -> int:
         height = standing(throw).height
     table = Table(height=height, restitution=options.restitution, friction=options.friction)
     rows = beside(land_throw, throw, table, options.law, [name.strip() for name in options.programs.split(",")])
-    print(told(rows, table))
+    print(describe(rows, table))
     return 0
 
 

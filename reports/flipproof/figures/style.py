@@ -38,7 +38,7 @@ STYLES: dict[str, dict[str, Any]] = {
 ASSUMPTIONS = (
     "#E69F00", "#6A5ACD", "#CC79A7", "#882255", "#999933", "#0072B2", "#44AA99", "#D55E00", "#999999", "#000000",
 )  # fmt: skip
-OTHERS = ("#CC79A7", "#E69F00", "#000000", "#999933", "#882255")
+EXTRA_COLOURS = ("#CC79A7", "#E69F00", "#000000", "#999933", "#882255")
 MARKERS = "os^Dv<>"
 
 STYLE: dict[Any, Any] = {
@@ -128,7 +128,7 @@ def _written(text: str) -> str:
 
 def solver_style(label: str, k: int = 0) -> dict[str, Any]:
     """Return colour, style and width of a solver's line; an unknown solver takes the ``k``-th of the other colours."""
-    return STYLES.get(label, {"color": OTHERS[k % len(OTHERS)], "linestyle": "-.", "linewidth": 1.4})
+    return STYLES.get(label, {"color": EXTRA_COLOURS[k % len(EXTRA_COLOURS)], "linestyle": "-.", "linewidth": 1.4})
 
 
 def new_figure(

@@ -84,7 +84,7 @@ def make_gallery(
         (folder / "index.html").write_text(render_gallery(exhibits, runs, facts), encoding="utf-8")
         summary = {
             "figures": {exhibit.name: exhibit.title for exhibit in exhibits},
-            "flights": len(runs.made),
+            "flights": len(runs.results),
             "failed": runs.failures(),
             "provenance": facts,
         }
@@ -92,7 +92,7 @@ def make_gallery(
     failed = f", {len(runs.failures())} flights failed" if runs.failures() else ""
     figures = f"{len(exhibits)} figure{'' if len(exhibits) == 1 else 's'}"
     seconds = time.perf_counter() - began
-    return f"{figures} from {len(runs.made)} flights{failed}: {out / 'index.html'} ({seconds:.0f} s)"
+    return f"{figures} from {len(runs.results)} flights{failed}: {out / 'index.html'} ({seconds:.0f} s)"
 
 
 def gather_figures(

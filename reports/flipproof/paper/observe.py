@@ -35,16 +35,16 @@ class CaseFlights:
     """
 
     solver: str
-    made: Mapping[str, RunResult]
+    results: Mapping[str, RunResult]
     halved: CaseFlights | None = None
     half_steps: CaseFlights | None = None
     seen: dict[str, Trajectory] = field(default_factory=dict)
 
     def run(self, key: str) -> Trajectory:
         """Return one flight; raises Missing if it was not made, or did not reach its end."""
-        if key not in self.made:
+        if key not in self.results:
             raise Missing(f"{key!r} was not flown by {self.solver}")
-        run = self.seen[key] = self.made[key].whole
+        run = self.seen[key] = self.results[key].whole
         return run
 
     def at(self, name: str, value: float) -> Trajectory:
@@ -61,7 +61,7 @@ class CaseFlights:
 
         Raises Missing if any flight is not there, but for those whose number of slices is too large for this solver.
         """
-        cases = [case for case in family(name) if not case.slices_vary or case.key in self.made]
+        cases = [case for case in family(name) if not case.slices_vary or case.key in self.results]
         flown = [(case.value, self.run(case.key)) for case in cases]
         return {value: of(run) for value, run in flown if low <= value <= high}
 

@@ -70,7 +70,7 @@ class Planned:
 class PaperRuns:
     """Every planned run of the paper's figures and statements by its name, and costs if they were asked for."""
 
-    made: Mapping[Name, RunResult]
+    results: Mapping[Name, RunResult]
     costs: tuple[Cost, ...] = ()
 
     @classmethod
@@ -78,25 +78,26 @@ class PaperRuns:
         cls, answers: Flights, calls: Iterable[Call], planned: Iterable[Planned] = (), costs: Iterable[Call] = ()
     ) -> PaperRuns:
         """Return what became of ``group_calls``, of runs that are not grouped, and of ``cost_calls``."""
-        made = {plan.name: answers[plan.run] for plan in planned if not plan.grouped}
-        made |= {name: made for call in calls for name, made in answers.answer(call).items()}
-        return cls(made=made, costs=tuple(cost for call in costs for cost in answers.answer(call)))
+        results = {plan.name: answers[plan.run] for plan in planned if not plan.grouped}
+        results |= {name: result for call in calls for name, result in answers.answer(call).items()}
+        return cls(results=results, costs=tuple(cost for call in costs for cost in answers.answer(call)))
 
     def flights(self, solver: str) -> observe.CaseFlights:
         """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
 
         def of(wanted: Half) -> dict[str, RunResult]:
-            return {key: result for (by, key, half), result in self.made.items() if by == solver and half == wanted}
+            return {key: result for (by, key, half), result in self.results.items() if by == solver and half == wanted}
 
         usual = of("")
         halved, half_steps = (
-            observe.CaseFlights(solver=solver, made=usual | own) if (own := of(half)) else None for half in HALVES
+            observe.CaseFlights(solver=solver, results=usual | half_results) if (half_results := of(half)) else None
+            for half in HALVES
         )
-        return observe.CaseFlights(solver=solver, made=usual, halved=halved, half_steps=half_steps)
+        return observe.CaseFlights(solver=solver, results=usual, halved=halved, half_steps=half_steps)
 
     def trajectory(self, solver: str, key: str) -> Trajectory | None:
         """Return the trajectory of a case, or None if it was not planned or failed."""
-        result = self.made.get((solver, key, ""))
+        result = self.results.get((solver, key, ""))
         return None if result is None else result.trajectory
 
     def members(self, solver: str, name: str) -> list[tuple[Case, Trajectory]]:
@@ -108,7 +109,7 @@ class PaperRuns:
         """Return solver, case and reason of every run that gave no trajectory."""
         return [
             f"{solver}, {key}: {result.reason}"
-            for (solver, key, _), result in self.made.items()
+            for (solver, key, _), result in self.results.items()
             if result.trajectory is None
         ]
 
@@ -153,8 +154,8 @@ def group_calls(planned: Iterable[Planned], words: str) -> list[Call]:
 def cost_calls() -> list[Call]:
     """Return the calls that measure what runs cost."""
     published = Call(measure_published, (PUBLISHED,), "the cost of the published program", timed=True)
-    others = (Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in SOLVERS[1:])
-    return [published, *others]
+    event_driven = (Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in SOLVERS[1:])
+    return [published, *event_driven]
 
 
 def make_group(group: Iterable[Planned]) -> dict[Name, RunResult]:

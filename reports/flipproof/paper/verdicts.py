@@ -129,7 +129,7 @@ def judge_paper(runs: PaperRuns) -> PaperVerdicts:
 
 def judge_all(flights: list[CaseFlights]) -> tuple[Statement, ...]:
     """Return every statement with its judgements, in the order of the paper."""
-    geometry = [CaseFlights(solver="geometry", made={})]
+    geometry = [CaseFlights(solver="geometry", results={})]
     return tuple(
         replace(
             statement, judgements=tuple(judge(statement, by) for by in (geometry if statement.of_geometry else flights))

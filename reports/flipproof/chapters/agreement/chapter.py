@@ -115,8 +115,8 @@ def study_agreement(
 def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
     apart = [{pair.first, pair.second} for pair in pairs if not pair.agree]
     if not apart:
-        least = min(pair.share for pair in pairs)
-        times = "" if least == 1.0 else f" at {math.floor(100.0 * least)} % of the times or more"
+        min_share = min(pair.share for pair in pairs)
+        times = "" if min_share == 1.0 else f" at {math.floor(100.0 * min_share)} % of the times or more"
         return f"all agree within their bands{times}"
     alone = [name for name in names if all(name in two for two in apart)]
     if len(alone) == 1:
@@ -188,11 +188,11 @@ def agreement_on(
     return study_agreement({name: run for name, run in trajectories.items() if name in bands}, bands, until=until)
 
 
-def band_over_time(run: Run, other: Run, flights: Flights) -> FloatArray:
+def band_over_time(run: Run, rerun: Run, flights: Flights) -> FloatArray:
     """Return by how much another run of the same flight has differed from it so far, fraction of omega_0."""
-    usual, again = flights[run].flight, flights[other].flight
+    usual, again = flights[run].flight, flights[rerun].flight
     if len(usual.t) != len(again.t):
-        raise Missing(f"{run.name} and {other.name} end at different times: its band is not known")
+        raise Missing(f"{run.name} and {rerun.name} end at different times: its band is not known")
     moved = np.abs(again.omega - usual.omega) / abs(usual.scenario.omega0)
     return np.asarray(np.maximum.accumulate(np.maximum(moved, FLOOR)))
 

@@ -91,17 +91,19 @@ class Alignment:
 def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
     """Align the impacts of two runs of one throw, both of which keep a record of them; without one, raise Missing."""
     until = float(min(first.t[-1], second.t[-1]))
-    (times, keys, unsure), (others, other_keys, other_unsure) = (_fast_impacts(run, until) for run in (first, second))
+    (times, keys, unsure), (other_times, other_keys, other_unsure) = (
+        _fast_impacts(run, until) for run in (first, second)
+    )
     rows: list[tuple[int, int, float, float]] = []
     for i in range(first.scenario.n_slices):
         for end in END_NAMES:
-            mine, its = (np.flatnonzero((both == (i, end)).all(axis=1)) for both in (keys, other_keys))
-            j, k = closest(times, others, mine, its)
-            near = np.abs(others[k] - times[j]) <= SHIFT
+            in_first, in_second = (np.flatnonzero((both == (i, end)).all(axis=1)) for both in (keys, other_keys))
+            j, k = closest(times, other_times, in_first, in_second)
+            near = np.abs(other_times[k] - times[j]) <= SHIFT
             j, k = j[near], k[near]
-            rows += [(i, end, *pair) for pair in zip(times[j], others[k], strict=True)]
-            rows += [(i, end, times[at], np.nan) for at in np.setdiff1d(mine, j) if not unsure[at]]
-            rows += [(i, end, np.nan, others[at]) for at in np.setdiff1d(its, k) if not other_unsure[at]]
+            rows += [(i, end, *pair) for pair in zip(times[j], other_times[k], strict=True)]
+            rows += [(i, end, times[at], np.nan) for at in np.setdiff1d(in_first, j) if not unsure[at]]
+            rows += [(i, end, np.nan, other_times[at]) for at in np.setdiff1d(in_second, k) if not other_unsure[at]]
     rows.sort(key=lambda row: float(np.nanmin(row[2:])))
     columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     return Alignment(
@@ -206,9 +208,9 @@ def _rows(alignment: Alignment) -> Iterator[tuple[Any, ...]]:
             yield name, "contact", i, END_NAMES[end], start, stop
     names = "; ".join(alignment.names), *alignment.names
     for name, impacts in zip(names, alignment.kinds, strict=True):
-        what = "impact" if name in alignment.names else "impact in both"
+        kind = "impact" if name in alignment.names else "impact in both"
         for i, end, start, stop in impacts:
-            yield name, what, i, END_NAMES[end], *((start, stop) if start == start else (stop, start))
+            yield name, kind, i, END_NAMES[end], *((start, stop) if start == start else (stop, start))
 
 
 def even_rows(n_slices: int) -> list[int]:

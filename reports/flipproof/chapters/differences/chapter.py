@@ -57,9 +57,9 @@ def ladder_pairs(models: Mapping[str, Model]) -> tuple[tuple[str, str, str], ...
             if not getattr(before, switch):
                 after = replace(before, **{switch: True})
                 pairs += [(assumption, first, second) for second in ladder if models[second].switches == after]
-    often = Counter(assumption for assumption, *_ in pairs)
+    counts = Counter(assumption for assumption, *_ in pairs)
     return tuple(
-        (assumption if often[assumption] == 1 else f"{assumption} ({first} to {second})", first, second)
+        (assumption if counts[assumption] == 1 else f"{assumption} ({first} to {second})", first, second)
         for assumption, first, second in pairs
     )
 
@@ -77,7 +77,7 @@ PAIRS: Final = (
 )
 """Name, first, second: down the ladder one assumption at a time, then the engines, then several together."""
 
-LEAST, MOST = 1e-6, 2.0
+AXIS_MIN, AXIS_MAX = 1e-6, 2.0
 """Ends of the axis of the figure, as shares of omega_0."""
 
 
@@ -183,14 +183,16 @@ def claims(results: Differences) -> Claims:
             yield Absent(_id(first, second), name, reason, "observation")
 
 
-def claim_guest(d: Difference, guest: Guest, own: float | None) -> Iterator[Finding]:
+def claim_guest(d: Difference, guest: Guest, change: float | None) -> Iterator[Finding]:
     """Yield how far a guest is from its equation; of one that it declares, that its own error explains it."""
     band = Band.of(d.band, "twins and refinement")
     title, note = f"{d.second} and {d.first}: largest difference in ω", f"at t = {d.largest_time:.4g} s"
     yield observed(f"guest-{guest.slug}-{d.first}", title, d.largest, "of ω₀", note, band=band)
     if guest.traits is not None and guest.traits.equation == d.first:
-        room = UNREFINED if own is None else 1e-3 + 5 * (d.band or 0.0)
-        words = "it cannot be refined" if own is None else f"its own change between its finest efforts is {own:.2g}"
+        room = UNREFINED if change is None else 1e-3 + 5 * (d.band or 0.0)
+        words = (
+            "it cannot be refined" if change is None else f"its own change between its finest efforts is {change:.2g}"
+        )
         title = f"{d.second}: largest difference in ω from {d.first}, the equation that it declares"
         note = f"N = {d.slices}, t = {d.largest_time:.4g} s; {words}"
         yield regression(f"guest-{guest.slug}-flight", title, d.largest, "of ω₀", (0.0, room), note)
@@ -221,7 +223,7 @@ def figures(results: Differences) -> Iterator[Exhibit]:
             label="|difference in ω| / ω₀ [1]",
             curves=curves,
             shown=(PROGRAM_EQ8, EQ8_FREE, TOTAL),
-            limits=(LEAST, MOST),
+            limits=(AXIS_MIN, AXIS_MAX),
             beside=True,
         ),
     )
@@ -235,7 +237,7 @@ def draw(differences: Sequence[Difference]) -> Figure:
     size = (8.0, 0.5 + 1.75 * rows)
     figure, grid = new_figure(rows, columns, size=size, sharex=True, sharey=True, squeeze=False)
     for axes, difference in zip(grid.flat, differences, strict=False):
-        axes.plot(difference.t, np.maximum(np.abs(difference.omega), LEAST / 10), color=line, linewidth=1.2)
+        axes.plot(difference.t, np.maximum(np.abs(difference.omega), AXIS_MIN / 10), color=line, linewidth=1.2)
         axes.axhline(PARTING_BAND, color=limit, linewidth=1.0, linestyle=":")
         if difference.parting_time is not None:
             axes.plot(difference.parting_time, PARTING_BAND, "o", color=limit, markeredgecolor="white", markersize=7)
@@ -244,7 +246,7 @@ def draw(differences: Sequence[Difference]) -> Figure:
         axes.margins(x=0.02)
     for axes in grid.flat[len(differences) :]:
         axes.remove()
-    grid[0, 0].set(yscale="log", ylim=(LEAST, MOST))
+    grid[0, 0].set(yscale="log", ylim=(AXIS_MIN, AXIS_MAX))
     for axes in grid[:, 0]:
         axes.set_ylabel("|difference| [1]")
     # The lowest panel of every column.

@@ -31,7 +31,7 @@ LONG_DT, SHORT_DT = 1e-3, 1e-4
 """Iterations and steps [s] of the two runs that explode."""
 
 SHUFFLES: Final = (1, 2, 3)
-FEW, MANY = 25, 100
+N_LOW, N_HIGH = 25, 100
 """Seeds of the order of insertion, and iterations at which they are compared."""
 
 
@@ -50,14 +50,14 @@ class EngineFact:
     admissible: tuple[float, float]
     measure: Callable[[Mapping[str, RunResult]], tuple[float, str]]
 
-    def finding(self, made: Mapping[str, RunResult]) -> Finding:
+    def finding(self, results: Mapping[str, RunResult]) -> Finding:
         """Return the finding: that the number lies in its interval, or why there is none.
 
         A fact about an engine that is not installed and need not be cannot fail.
         """
         value, absent = None, False
         try:
-            value, note = self.measure(made)
+            value, note = self.measure(results)
         except ModuleNotFoundError as missing:
             note = f"{self.engine} is not installed ({missing})"
             absent = self.engine != "pymunk"
@@ -73,17 +73,21 @@ def plan_engine_facts(throw: Scenario) -> dict[str, Run]:
     Few slices, a flight that has its first impacts, an output time every millisecond. In a run that is about something
     else the engine iterates 100 times, where its rule asks for 57.
     """
-    few = replace(throw.with_slices(10), duration=min(0.2, throw.duration))
-    usual: dict[str, Any] = {"dt": 2e-4, "iterations": 100, "times": np.linspace(0.0, few.duration, 201)}
+    short_throw = replace(throw.with_slices(10), duration=min(0.2, throw.duration))
+    usual: dict[str, Any] = {"dt": 2e-4, "iterations": 100, "times": np.linspace(0.0, short_throw.duration, 201)}
     changes: dict[str, dict[str, Any]] = {
         "usual": {},
         "no gravity": {},
         **{f"few iterations, dt {dt:g} s": {"dt": dt, "iterations": FEW_ITERATIONS} for dt in (LONG_DT, SHORT_DT)},
-        **{f"order {k}, {n} iterations": {"iterations": n, "shuffle": k} for n in (FEW, MANY) for k in (0, *SHUFFLES)},
+        **{
+            f"order {k}, {n} iterations": {"iterations": n, "shuffle": k}
+            for n in (N_LOW, N_HIGH)
+            for k in (0, *SHUFFLES)
+        },
         # Unless told otherwise a joint removes a tenth of the error at each of 60 steps a second.
         "joints corrected as by default": {"error_bias": (1.0 - 0.1) ** 60},
     }
-    throws = dict.fromkeys(changes, few) | {"no gravity": without_gravity(few)}
+    throws = dict.fromkeys(changes, short_throw) | {"no gravity": without_gravity(short_throw)}
     return {words: Run("pymunk", throws[words], usual | changes[words], f"engine fact, {words}") for words in changes}
 
 
@@ -107,19 +111,19 @@ def _smaller_step(results: Mapping[str, RunResult]) -> tuple[float, str]:
 
 def _widest(results: Mapping[str, RunResult], iterations: int) -> float:
     """Return the largest change of omega by another order."""
-    usual, *others = (results[f"order {seed}, {iterations} iterations"].whole for seed in (0, *SHUFFLES))
-    return max(largest_change(usual, other) for other in others)
+    usual, *shuffled = (results[f"order {seed}, {iterations} iterations"].whole for seed in (0, *SHUFFLES))
+    return max(largest_change(usual, run) for run in shuffled)
 
 
 def _order(results: Mapping[str, RunResult]) -> tuple[float, str]:
-    again = largest_change(results["usual"].whole, results[f"order 0, {MANY} iterations"].whole)
-    return _widest(results, FEW), f"{len(SHUFFLES)} shuffled orders; the same order twice: {again:.1g}"
+    again = largest_change(results["usual"].whole, results[f"order 0, {N_HIGH} iterations"].whole)
+    return _widest(results, N_LOW), f"{len(SHUFFLES)} shuffled orders; the same order twice: {again:.1g}"
 
 
 def _order_forgotten(results: Mapping[str, RunResult]) -> tuple[float, str]:
-    few, many = _widest(results, FEW), _widest(results, MANY)
-    note = f"{few:.1e} to {many:.1e} of ω₀: what the order moves is what the solver has not iterated away"
-    return many / few, note
+    low, high = _widest(results, N_LOW), _widest(results, N_HIGH)
+    note = f"{low:.1e} to {high:.1e} of ω₀: what the order moves is what the solver has not iterated away"
+    return high / low, note
 
 
 def _joints(results: Mapping[str, RunResult]) -> tuple[float, str]:
@@ -250,8 +254,8 @@ def _mujoco_path(xml: str, *, speed: float, duration: float) -> Iterator[tuple[f
 
 
 def _elasticity(_: Mapping[str, RunResult]) -> tuple[float, str]:
-    others = ", ".join(f"{a:g} and {b:g} give {rebound_of_two(a, b):.2f}" for a, b in ((1.0, 0.5), (0.0, 1.0)))
-    return rebound_of_two(0.5, 0.5), others
+    examples = ", ".join(f"{a:g} and {b:g} give {rebound_of_two(a, b):.2f}" for a, b in ((1.0, 0.5), (0.0, 1.0)))
+    return rebound_of_two(0.5, 0.5), examples
 
 
 def _slop(_: Mapping[str, RunResult]) -> tuple[float, str]:
@@ -270,9 +274,9 @@ WORDS: Final = {
     "gravity": "gravity changes nothing in free flight: largest change of ω(t) when it is switched off",
     "smaller-step": f"with {FEW_ITERATIONS} iterations a tenth of the step explodes sooner: ratio of the times until "
     "it explodes",
-    "order": f"the order in which bodies enter matters: largest change of ω(t), {FEW} iterations",
+    "order": f"the order in which bodies enter matters: largest change of ω(t), {N_LOW} iterations",
     "order-forgotten": "a solver that converges forgets the order: largest change of ω(t) at "
-    f"{MANY} iterations over that at {FEW}",
+    f"{N_HIGH} iterations over that at {N_LOW}",
     "joints": "joints give: how far a mass leaves the axis that a joint holds it on, default correction",
     "elasticity": "elasticities multiply: restitution of two shapes of 0.5 each",
     "groove-end": "the end of a groove is a dead stop whatever the elasticity: speed back over speed before",

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from engine_check.engines import ENGINES
-from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHERS, SCHEMES, Guest
+from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHER_SOLVERS, SCHEMES, Guest
 from flipproof.figures.style import new_figure, shared_legend, shown_name, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, RunResult, Study, Touch
 from flipproof.frame.solvers import find
@@ -33,7 +33,7 @@ class Flown(NamedTuple):
     """What became of every solver on the throw, by its name."""
 
     throw: Scenario
-    made: Mapping[str, RunResult]
+    results: Mapping[str, RunResult]
     guests: Mapping[str, Guest] = MappingProxyType({})
 
     @property
@@ -44,42 +44,42 @@ class Flown(NamedTuple):
     @property
     def drawn(self) -> list[Trajectory]:
         """The flights that are drawn."""
-        return [run for name in self.shown if (run := self.made[name].trajectory) is not None]
+        return [run for name in self.shown if (run := self.results[name].trajectory) is not None]
 
     @property
     def tables(self) -> dict[str, str]:
         """The file of the trajectory of every solver that flew, by its name."""
         names = {name: f"guest-{guest.slug}" for name, guest in self.guests.items()}
-        flown = [name for name, result in self.made.items() if result.trajectory is not None]
+        flown = [name for name, result in self.results.items() if result.trajectory is not None]
         return {name: f"trajectories/{names.get(name, name)}/data.csv" for name in flown}
 
     @property
     def rows(self) -> list[dict[str, Any]]:
         """What a report says of every solver: status, end, plateau, impacts, diagnostics."""
-        return [solver_row(name, result) for name, result in self.made.items()]
+        return [solver_row(name, result) for name, result in self.results.items()]
 
     @property
     def motion(self) -> dict[str, Any] | None:
         """What the moving bottles are drawn from."""
-        return motion_data(self.throw, self.made)
+        return motion_data(self.throw, self.results)
 
 
 def study(ask: Ask) -> Study[Flown]:
     """Fly the throw with every solver that can."""
     flights = yield ask.solvers.values()
-    names = [name for name in (*FLIGHTS, *OTHERS, *ask.guests) if name in ask.solvers]
+    names = [name for name in (*FLIGHTS, *OTHER_SOLVERS, *ask.guests) if name in ask.solvers]
     return Flown(ask.throw, {name: flights[ask.solvers[name]] for name in names}, ask.guests)
 
 
-def solver_row(name: str, made: RunResult) -> dict[str, Any]:
+def solver_row(name: str, result: RunResult) -> dict[str, Any]:
     """Return what a report says of one solver."""
-    solver, run = find(made.run.solver), made.trajectory
+    solver, run = find(result.run.solver), result.trajectory
     row: dict[str, Any] = {"name": name, "package": solver.package, "equation": solver.equation}
-    row |= {"reason": solver.reason, "seconds": made.seconds}
+    row |= {"reason": solver.reason, "seconds": result.seconds}
     if run is None:
-        return row | {"status": "failed", "message": made.reason}
+        return row | {"status": "failed", "message": result.reason}
     if solver.package == "engine_check":
-        row |= {"reason": ENGINES[made.run.solver].words}
+        row |= {"reason": ENGINES[result.run.solver].words}
     landed = run.t[-1] >= run.scenario.duration * (1 - 1e-12)
     return row | {
         "status": run.status,
@@ -245,5 +245,5 @@ CHAPTER: Final = Chapter(
     figures=figures,
     page=lambda results: {"rows": results.rows, "drawn": results.shown, "tables": results.tables},
     summary=lambda results: {"solvers": results.rows},
-    tables=lambda results: {file: trajectory_csv(results.made[name].flight) for name, file in results.tables.items()},
+    tables=lambda flown: {file: trajectory_csv(flown.results[name].flight) for name, file in flown.tables.items()},
 )

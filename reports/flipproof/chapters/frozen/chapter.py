@@ -195,9 +195,9 @@ def figure_frozen(study: Frozen) -> Figure:
         label = f"{coefficients[quantity]}: largest in {100 * study.share[quantity]:.0f} % of the steps"
         colour = colours[quantity]
         if quantity == "v_cm":  # jumps at every impact: its range within a window leaves the others to be seen
-            t, least, most = envelope(study.t, values)
+            t, low, high = envelope(study.t, values)
             label += f" (range within {1e3 * (t[1] - t[0]):.2g} ms)"
-            defects.fill_between(t, least, most, color=colour, alpha=0.35, linewidth=0.0, step="mid", label=label)
+            defects.fill_between(t, low, high, color=colour, alpha=0.35, linewidth=0.0, step="mid", label=label)
         else:
             defects.semilogy(study.t, _shown(values), color=colour, linewidth=1.4, label=label)
         defects.plot(time, peak, MARKERS[k], color=colour, markeredgecolor="white", markersize=8)
@@ -229,8 +229,8 @@ def envelope(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray,
     windows = np.array_split(np.arange(len(t)), min(100, len(t)))
     shown = _shown(values)
     kept = [shown[window][np.isfinite(shown[window])] for window in windows]
-    least, most = (np.array([pick(finite) if len(finite) else np.nan for finite in kept]) for pick in (np.min, np.max))
-    return np.array([t[window].mean() for window in windows]), least, most
+    low, high = (np.array([pick(finite) if len(finite) else np.nan for finite in kept]) for pick in (np.min, np.max))
+    return np.array([t[window].mean() for window in windows]), low, high
 
 
 def _shown(values: FloatArray) -> FloatArray:

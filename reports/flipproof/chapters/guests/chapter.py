@@ -21,9 +21,9 @@ FLOOR: Final = 1e-12
 """Least error that is drawn [omega_0]."""
 
 
-def claims(found: Sequence[Visit]) -> Claims:
+def claims(visits: Sequence[Visit]) -> Claims:
     """Yield each check of every guest's certificate, and what leads from it to free flight."""
-    for visit in found:
+    for visit in visits:
         guest = visit.guest
         head, label = f"guest-{guest.slug}", guest.label
         if visit.certificate.result is not None:
@@ -33,28 +33,28 @@ def claims(found: Sequence[Visit]) -> Claims:
             name = name.removeprefix(f"{label}, ").replace(" ", "-")
             yield Absent(f"{head}-{name}-missing", f"{label}: {name}", reason, "observation" if idle else "regression")
         if (waterfall := visit.waterfall.result) is not None:
-            rest, *bars = waterfall.bars
+            remainder, *bars = waterfall.bars
             parts = ", ".join(f"{bar.name} {bar.average:+.3g}" for bar in bars) or "none"
             title = f"{label}: mean of ω/ω₀ over the second half, free flight minus it"
-            note = f"fair shares of what its equation assumes: {parts}; {rest.name} {rest.average:+.2g}"
+            note = f"fair shares of what its equation assumes: {parts}; {remainder.name} {remainder.average:+.2g}"
             band = Band.of(visit.band, "refinement")
             yield observed(f"{head}-waterfall", title, waterfall.total, "", note, band=band)
         if visit.placed is not None:
-            rung, off = visit.placed
+            rung, deviation = visit.placed
             room = UNREFINED if visit.band is None else 1e-3 + 5 * visit.band
-            own = "it cannot be refined" if visit.band is None else f"its own change is {visit.band:.2g}"
+            change = "it cannot be refined" if visit.band is None else f"its own change is {visit.band:.2g}"
             title = f"{label}: largest difference in ω from {rung}, the equation it was placed on"
-            yield regression(f"{head}-flight", title, off, "of ω₀", (0.0, room), own)
+            yield regression(f"{head}-flight", title, deviation, "of ω₀", (0.0, room), change)
         if visit.rise is not None:
             title = f"{label}: largest rise of the energy between two output times"
             yield observed(f"{head}-energy", title, visit.rise, "of E(0)")
 
 
-def figures(found: Sequence[Visit]) -> Iterator[Exhibit]:
+def figures(visits: Sequence[Visit]) -> Iterator[Exhibit]:
     """Yield what refinement buys the guests, and the waterfall of each."""
-    if refined := [visit for visit in found if len(visit.refined) > 1]:
+    if refined := [visit for visit in visits if len(visit.refined) > 1]:
         yield _draw_convergence(refined)
-    for visit in found:
+    for visit in visits:
         if (waterfall := visit.waterfall.result) is not None:
             bars = ", ".join(f"{bar.name} {bar.average:+.3f}" for bar in waterfall.bars)
             yield Exhibit(
@@ -114,12 +114,12 @@ def summarise(visit: Visit) -> dict[str, Any]:
     guest, certificate, waterfall = visit.guest, visit.certificate.result, visit.waterfall.result
     split: Mapping[str, Any] | None = None
     if waterfall is not None:
-        rest, *bars = waterfall.bars
+        remainder, *bars = waterfall.bars
         switch = {words: name for name, words in NAMES.items()}
         split = {
             "guest": waterfall.start,
             "free-flight": waterfall.end,
-            "rest": rest.average,
+            "rest": remainder.average,
             "bars": {switch[bar.name]: bar.average for bar in bars},
             "ranges": {switch[bar.name]: [bar.low, bar.high] for bar in bars},
         }

@@ -140,8 +140,8 @@ def placed_on(
     if declared or flight is None or place is None or not place["on_lattice"] or place["equation"] not in rungs:
         return None
     rung = rungs[place["equation"]]
-    off = np.abs(np.interp(flight.t, rung.t, rung.omega) - flight.omega)
-    return str(place["equation"]), float(np.max(off) / abs(flight.scenario.omega0))
+    deviation = np.abs(np.interp(flight.t, rung.t, rung.omega) - flight.omega)
+    return str(place["equation"]), float(np.max(deviation) / abs(flight.scenario.omega0))
 
 
 def place_in(certificate: Certificate | None) -> Mapping[str, Any] | None:
@@ -241,18 +241,18 @@ def split(visit: Visit, throw: Scenario, start: Switches, flights: Flights) -> W
     def value(names: Sequence[str]) -> float:
         return read(equation_run(throw, mended(start, names)))
 
-    own, end = read(visit.guest.run(throw)), value(differing(start))
-    alike = dict.fromkeys(("forward", "backward", "average", "low", "high"), value(()) - own)
+    guest_level, end = read(visit.guest.run(throw)), value(differing(start))
+    alike = dict.fromkeys(("forward", "backward", "average", "low", "high"), value(()) - guest_level)
     alike |= dict.fromkeys(("forward_band", "average_band"), visit.band or 0.0)
     bars = (Bar(name=f"the rest, to {name_of(start)}", **alike), *bars_of(differing(start), value, lambda _: 0.0))
     return Waterfall(
         observable=OBSERVABLES[0],
         slices=throw.n_slices,
-        start=own,
+        start=guest_level,
         end=end,
         end_band=0.0,
         bars=bars,
-        residual=missed_by(bars, own, end),
+        residual=missed_by(bars, guest_level, end),
         rods=read(rods_run(throw)),
         solver=visit.guest.label,
     )

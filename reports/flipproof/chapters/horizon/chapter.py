@@ -38,7 +38,7 @@ Kind = Literal["angle", "release", "order"]
 BAND: Final = 1e-3
 """A flight is predictable while omega is known to this fraction of omega_0."""
 
-OWN: Final = ("eq8", FREE)
+OWN_THROW_SOLVERS: Final = ("eq8", FREE)
 """Equations whose flight of the report's own throw is released anew."""
 
 OWN_SIZE: Final = 1e-9
@@ -47,7 +47,7 @@ OWN_SIZE: Final = 1e-9
 LINES: Final = ("-", (0, (5, 2)), (0, (3, 1.5, 1, 1.5)), (0, (1, 1.5)))
 """Styles of the lines by size of the change."""
 
-LEAST: Final = 1e-16
+MIN_WIDTH: Final = 1e-16
 """Width below which none is drawn."""
 
 
@@ -69,7 +69,7 @@ class Level(NamedTuple):
     runs: list[Run]
 
     @property
-    def what(self) -> str:
+    def variation(self) -> str:
         """What differs, in words."""
         if self.kind == "order":
             return f"{len(self.runs)} orders of the bodies"
@@ -81,14 +81,14 @@ class Horizon:
     """The ensembles of one solver on one throw; ``problems`` says of those that are missing why they are."""
 
     solver: str
-    own: bool
+    own_throw: bool
     ensembles: tuple[tuple[Level, Ensemble], ...]
     problems: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
         """The solver, and whether the throw is the report's own."""
-        return f"{self.solver}, this throw" if self.own else self.solver
+        return f"{self.solver}, this throw" if self.own_throw else self.solver
 
     @property
     def horizon(self) -> float | None:
@@ -107,7 +107,7 @@ def words_of(level: Level, ensemble: Ensemble) -> str:
     left, ended = ensemble.horizon, ensemble.ended
     when = f"never beyond {BAND:g}" if left is None else f"beyond {BAND:g} from {left * 1e3:.1f} ms"
     return (
-        f"N = {level.runs[0].scenario.n_slices}, {level.what}: width at most {ensemble.largest:.1e} of ω₀, "
+        f"N = {level.runs[0].scenario.n_slices}, {level.variation}: width at most {ensemble.largest:.1e} of ω₀, "
         f"{ensemble.width[-1]:.1e} at the end, {when}; {ensemble.growth.words}"
         + ("" if ended is None else f"; a member ends at {ended * 1e3:.1f} ms")
     )
@@ -149,22 +149,22 @@ def plan_horizon(throw: Scenario, solver: str, reach: Reach) -> list[Level]:
 
 def plan_own(base: Run) -> list[Level]:
     """Return the runs of the ensemble of a solver on the report's own throw."""
-    others = [
+    changed = [
         Run(base.solver, released(base.scenario, by), base.settings, f"{base.name}, release changed by {by:+.0e}")
         for by in (OWN_SIZE, -OWN_SIZE)
     ]
-    return [Level("release", OWN_SIZE, [base, *others])]
+    return [Level("release", OWN_SIZE, [base, *changed])]
 
 
 def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
     """Fly the ensembles of ``ask.work`` on the paper's throw, and those of the report's own."""
     plans = {(name, False): plan_horizon(ask.reference, name, ask.work) for name in ask.work.solvers}
-    plans |= {(name, True): plan_own(ask.solvers[name]) for name in OWN}
+    plans |= {(name, True): plan_own(ask.solvers[name]) for name in OWN_THROW_SOLVERS}
     flights = yield [run for levels in plans.values() for level in levels for run in level.runs]
-    return tuple(study_horizon(solver, own, levels, flights) for (solver, own), levels in plans.items())
+    return tuple(study_horizon(solver, own_throw, levels, flights) for (solver, own_throw), levels in plans.items())
 
 
-def study_horizon(solver: str, own: bool, levels: Sequence[Level], flights: Flights) -> Horizon:
+def study_horizon(solver: str, own_throw: bool, levels: Sequence[Level], flights: Flights) -> Horizon:
     """Read the ensembles of a solver; one that could not be run, as an engine that is not installed, has none."""
     outcomes = [
         (level, attempt(lambda runs: Ensemble.of([flights[run].flight for run in runs], BAND), level.runs))
@@ -172,7 +172,7 @@ def study_horizon(solver: str, own: bool, levels: Sequence[Level], flights: Flig
     ]
     return Horizon(
         solver=solver,
-        own=own,
+        own_throw=own_throw,
         ensembles=tuple((level, outcome.result) for level, outcome in outcomes if outcome.result is not None),
         problems=tuple(dict.fromkeys(outcome.reason for _, outcome in outcomes if outcome.reason)),
     )
@@ -181,7 +181,7 @@ def study_horizon(solver: str, own: bool, levels: Sequence[Level], flights: Flig
 def claims(results: tuple[Horizon, ...]) -> Claims:
     """Yield the widest ensembles on the paper's throw, and by how much the report's own amplifies a small change."""
     for horizon in results:
-        if horizon.own:
+        if horizon.own_throw:
             yield claim_amplification(horizon)
             continue
         yield claim_horizon(horizon)
@@ -223,9 +223,9 @@ def claim_amplification(study: Horizon) -> Finding:
     if not study.ensembles:
         return observed(name, title, None, note="; ".join(study.problems))
     ((level, ensemble),) = study.ensembles
-    base, *others = (run.scenario for run in level.runs)
+    base, *changed = (run.scenario for run in level.runs)
     # What is left of the change in the digits of theta_0 and omega_0.
-    sizes = [max(abs(at.theta0 - base.theta0), abs(at.omega0 / base.omega0 - 1)) for at in others]
+    sizes = [max(abs(at.theta0 - base.theta0), abs(at.omega0 / base.omega0 - 1)) for at in changed]
     return observed(name, title, float(ensemble.change.max() / max(sizes)), note=words_of(level, ensemble))
 
 
@@ -251,7 +251,7 @@ def figures(results: tuple[Horizon, ...]) -> Iterator[Exhibit]:
         data=(studies,),
         table=curves_csv(
             {
-                f"width of omega/omega_0 {study.name}, {level.what} [1]": (ensemble.t, ensemble.width)
+                f"width of omega/omega_0 {study.name}, {level.variation} [1]": (ensemble.t, ensemble.width)
                 for study in studies
                 for level, ensemble in study.ensembles
             }
@@ -279,7 +279,7 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
     top = [
         ensemble.width[np.isfinite(ensemble.width)].max(initial=BAND) for s in studies for _, ensemble in s.ensembles
     ]
-    grid[0, 0].set_ylim(LEAST / 3, 10 * max(top))
+    grid[0, 0].set_ylim(MIN_WIDTH / 3, 10 * max(top))
     for axes in grid[:, 0]:
         axes.set_ylabel("width of ω / ω₀ [1]")
     for axes in grid.flat[max(len(studies) - columns, 0) : len(studies)]:
@@ -298,7 +298,7 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
 def _draw_widths(axes: Axes, study: Horizon, lines: dict[float, Any], colour: str) -> None:
     for level, ensemble in study.ensembles:
         seen = np.isfinite(ensemble.width) & (ensemble.width > 0.0)
-        shown = np.where(seen, np.maximum(ensemble.width, LEAST), np.nan)
+        shown = np.where(seen, np.maximum(ensemble.width, MIN_WIDTH), np.nan)
         look = {"color": "black"} if level.kind == "order" else {"color": colour, "linestyle": lines[level.size]}
         axes.plot(ensemble.t, shown, linewidth=0.8 if level.kind == "angle" else 1.6, **look)
         if ensemble.horizon is not None:

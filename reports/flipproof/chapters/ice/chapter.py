@@ -68,19 +68,19 @@ def study(ask: Ask) -> Study[Ice]:
     rigid[f"{ENGINE} rigid"] = Run(ENGINE, ice, {"ice": "rigid"}, f"ice, {ENGINE} rigid")
     welded = {}
     # The drift of welded ice hardly depends on its slices.
-    few = replace(ask.reference.with_slices(20), frozen=True)
+    coarse = replace(ask.reference.with_slices(20), frozen=True)
     # Output times by which the engine's step, a whole part of each interval and 0.4 ms at the most, really halves.
-    times = np.linspace(0.0, few.duration, 1 + int(np.ceil(few.duration / 4e-4)))
+    times = np.linspace(0.0, coarse.duration, 1 + int(np.ceil(coarse.duration / 4e-4)))
     for dt in float(times[1]) / np.array([1, 2, 4]) if ask.work else ():
         label = f"{ENGINE} welded, Δt = {dt:.2g} s"
-        welded[label] = Run(ENGINE, few, {"ice": "welded", "dt": float(dt), "times": times}, f"ice, {label}")
+        welded[label] = Run(ENGINE, coarse, {"ice": "welded", "dt": float(dt), "times": times}, f"ice, {label}")
     asked = {label: guest for label, guest in ask.guests.items() if not guest.curve}
     guests = {label: guest.run(ice, 0) for label, guest in asked.items()}
     flights = yield [*rigid.values(), *welded.values(), *guests.values()]
-    rigid_made, welded_made, guests_made = (
+    rigid_results, welded_results, guest_results = (
         {label: flights[run] for label, run in runs.items()} for runs in (rigid, welded, guests)
     )
-    return Ice(rigid_made, welded_made, guests_made, {label: guest.slug for label, guest in asked.items()})
+    return Ice(rigid_results, welded_results, guest_results, {label: guest.slug for label, guest in asked.items()})
 
 
 def measure(label: str, run: Trajectory) -> Drift:
@@ -146,18 +146,18 @@ def figures(results: Ice) -> Iterator[Exhibit]:
 def draw(drifts: Sequence[Drift]) -> Figure:
     """Draw the drifts on a logarithmic scale with a floor; each that is zero gets a line of its own above it."""
     figure, axes = new_figure(size=(8.0, 4.3))
-    least = 1e-18  # that is drawn
-    others = cycle(("#882255", "#CC79A7", "#E69F00"))
+    min_drift = 1e-18  # that is drawn
+    colours = cycle(("#882255", "#CC79A7", "#E69F00"))
     exact = 0
     for ice in drifts:
-        floor = least * 3.0**exact
+        floor = min_drift * 3.0**exact
         exact += ice.largest == 0.0
         words = f"{ice.label}: {'none' if ice.largest == 0.0 else f'{ice.largest:.1e}'}"
         style = STYLES.get(ENGINE if ice.label == f"{ENGINE} rigid" else ice.label)
-        colour = style["color"] if style else next(others)
+        colour = style["color"] if style else next(colours)
         axes.semilogy(ice.t, np.maximum(ice.drift, floor), color=colour, linewidth=1.5, label=words)
-    axes.set_ylim(least / 3, 1e-2)
-    axes.set(xlabel="time t [s]", ylabel=f"|ω / ω₀ − 1| [1], zero drawn below {1000 * least:.0e}")
+    axes.set_ylim(min_drift / 3, 1e-2)
+    axes.set(xlabel="time t [s]", ylabel=f"|ω / ω₀ − 1| [1], zero drawn below {1000 * min_drift:.0e}")
     axes.margins(x=0.01)
     shared_legend(figure, axes, columns=2)
     return figure

@@ -33,13 +33,13 @@ def study(ask: Ask) -> Study[LandingStudy]:
     planned = Call(aiming, (ask.throw, ask.work), "aims of the landing")
     flights = yield [planned]
     aims, unaimed = flights.answer(planned)
-    rows = yield from made("aims", aims, ask.work.seed)
+    rows = yield from throw_cases("aims", aims, ask.work.seed)
     throws = counting(ask.throw, ask.work, aims, rows)
-    rows = yield from made("throws", throws, ask.work.seed)
+    rows = yield from throw_cases("throws", throws, ask.work.seed)
     return read(ask.throw, ask.work, throws, rows, unaimed)
 
 
-def made(wave: str, cases: Cases, seed: int) -> Generator[list[Call], Flights, list[list[Landed]]]:
+def throw_cases(wave: str, cases: Cases, seed: int) -> Generator[list[Call], Flights, list[list[Landed]]]:
     """Ask workers for the throws of some cases, and return their rows, case by case."""
     calls = [Call(make_cases, (chunk, seed), f"landing, {wave}") for chunk in chunks(tuple(cases.values()))]
     flights = yield calls
@@ -75,9 +75,9 @@ def _water_and_ice(results: LandingStudy) -> Iterator[Finding]:
         if ice is None:
             continue
         difference, low, high = water.minus(ice)
-        others = {KINDS[kind].words: results.cell(kind, filling) for kind in WATER[1:]}
-        laws = ", ".join(f"{law} {cell.share.value:.3f}" for law, cell in others.items() if cell is not None)
-        verdict = _judged(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
+        cells = {KINDS[kind].words: results.cell(kind, filling) for kind in WATER[1:]}
+        laws = ", ".join(f"{law} {cell.share.value:.3f}" for law, cell in cells.items() if cell is not None)
+        verdict = _interval(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
         title = f"P(upright), water minus ice, at filling {filling:g} (abstract, section 3: redistribution helps)"
         note = f"{verdict}; law together; {laws}; {results.assumed}"
         band = Band((high - low) / 2, "sample")
@@ -96,11 +96,11 @@ def _best_filling(results: LandingStudy) -> Finding:
     def share(pair: tuple[float, Cell]) -> float:
         return pair[1].share.value
 
-    best, other = max(inside, key=share), max(outside, key=share)
-    difference, low, high = best[1].minus(other[1])
+    best, rival = max(inside, key=share), max(outside, key=share)
+    difference, low, high = best[1].minus(rival[1])
     note = (
-        f"best inside: {best[0]:g} with {share(best):.3f}, outside: {other[0]:g} with {share(other):.3f}; "
-        f"difference {difference:+.3f}, {_judged(low, high, ('decided', 'decided', 'not decided'))}; the interval is "
+        f"best inside: {best[0]:g} with {share(best):.3f}, outside: {rival[0]:g} with {share(rival):.3f}; "
+        f"difference {difference:+.3f}, {_interval(low, high, ('decided', 'decided', 'not decided'))}; the interval is "
         f"valid for fillings fixed beforehand, but these two were chosen from the same throws; {results.assumed}"
     )
     return observed(name, title, max(curve, key=share)[0], note=note)
@@ -126,7 +126,7 @@ def _bounces(results: LandingStudy) -> Finding:
     if water is None or ice is None:
         return observed(name, title, None, note="water or ice was not thrown at this filling")
     difference, band = ice.bounces - water.bounces, math.hypot(ice.bounces_band, water.bounces_band)
-    words = _judged(difference - band, difference + band, digits=2)
+    words = _interval(difference - band, difference + band, digits=2)
     note = f"until the outcome is certain; ice {ice.bounces:.2f}, water {water.bounces:.2f}; {words}; {results.assumed}"
     return observed(name, title, difference, "bounces", note, band=Band(band, "sample"))
 
@@ -135,10 +135,10 @@ def _model_uncertainty(results: LandingStudy) -> Finding:
     """Return how far the laws of the impact are apart: a band of the model, not of the sample."""
     name, title = "landing-laws", "Largest distance in P(upright) between two laws of the impact, water"
     pairs = [
-        (cell.minus(other), f"at filling {filling:g}, {KINDS[first].words} minus {KINDS[second].words}")
+        (cell.minus(second_cell), f"at filling {filling:g}, {KINDS[first].words} minus {KINDS[second].words}")
         for filling in results.size.fillings
         for first, second in itertools.permutations(WATER, 2)
-        if (cell := results.cell(first, filling)) and (other := results.cell(second, filling))
+        if (cell := results.cell(first, filling)) and (second_cell := results.cell(second, filling))
     ]
     if not pairs:
         return observed(name, title, None, note="one law only")
@@ -165,19 +165,19 @@ def _undecided(results: LandingStudy) -> Finding:
 
 def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield in how many touches two programs of one law differ, rods and ice."""
-    for case, matrix in [(each, matrix) for each in stored["cases"] for matrix in each["matrices"]]:
-        (program, other), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
+    for case, matrix in [(entry, matrix) for entry in stored["cases"] for matrix in entry["matrices"]]:
+        (first, second), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
         kind = "ice" if case["law"] is None else f"water-{case['law']}"
-        most = 0.03
-        title = f"Share of touches from which {program} and {other} differ in outcome: {kind.replace('-', ', ')}"
-        note = f"{differ} of {both} that both decide; at most {most:.0%} is required: "
+        max_share = 0.03
+        title = f"Share of touches from which {first} and {second} differ in outcome: {kind.replace('-', ', ')}"
+        note = f"{differ} of {both} that both decide; at most {max_share:.0%} is required: "
         share = differ / both if both else None
-        reached = share is not None and share <= most
+        reached = share is not None and share <= max_share
         note += f"{'reached' if reached else 'missed'}; stored, made by: {stored['command']}"
-        yield regression(f"landing-witnesses-{kind}-{program}-{other}", title, share, "", (0.0, most), note)
+        yield regression(f"landing-witnesses-{kind}-{first}-{second}", title, share, "", (0.0, max_share), note)
 
 
-def _judged(
+def _interval(
     low: float, high: float, words: Sequence[str] = ("holds", "fails", "cannot be decided"), digits: int = 3
 ) -> str:
     """Return an interval, and the first of the words if it lies above 0, the second if below, the third if neither."""

@@ -128,8 +128,8 @@ def _witness_figure(stored: Mapping[str, Any]) -> Exhibit:
     for case in stored["cases"]:
         kind = "ice" if case["law"] is None else f"water, {case['slices']}, {case['law']}"
         for matrix in case["matrices"]:
-            program, other = matrix["programs"]
-            words.append(f"{kind}, {program} and {other}: {matrix['differ']} of {matrix['decided by both']} differ")
+            first, second = matrix["programs"]
+            words.append(f"{kind}, {first} and {second}: {matrix['differ']} of {matrix['decided by both']} differ")
     return Exhibit(
         name="landing-witnesses",
         title="Programs that share no formula, from the same touches",
@@ -267,7 +267,7 @@ def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
     for axes in panels.ravel()[len(matrices) :]:
         axes.set_axis_off()
     for axes, (case, matrix) in zip(panels.ravel(), matrices, strict=False):
-        counts = np.array([[matrix["outcomes"].get(f"{outcome}/{other}", 0) for other in names] for outcome in names])
+        counts = np.array([[matrix["outcomes"].get(f"{first}/{second}", 0) for second in names] for first in names])
         axes.imshow(np.sqrt(counts), cmap="Blues", vmin=0.0, vmax=1.6 * math.sqrt(matrix["touches"]))
         for (row, column), count in np.ndenumerate(counts):
             if count:

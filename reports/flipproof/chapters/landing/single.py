@@ -69,7 +69,7 @@ def land_throw(
     return rows
 
 
-def told(rows: Sequence[Row], table: Table) -> str:
+def describe(rows: Sequence[Row], table: Table) -> str:
     """Return what happens as lines: the touch of each bottle, then a line for each landing."""
     lines = [
         f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g} (both assumed: no "

@@ -246,8 +246,8 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
     aim_of: dict[Place, Aim] = {}
     for place, ranked in candidates.items():
         ranked.sort(key=lambda candidate: candidate[0])
-        *others, (_, _, aim) = ranked
-        aim_of[place] = replace(aim, rival=max((share.interval[1] for _, share, _ in others), default=0.0))
+        *rivals, (_, _, aim) = ranked
+        aim_of[place] = replace(aim, rival=max((share.interval[1] for _, share, _ in rivals), default=0.0))
     cases: dict[Key, Case] = {}
     last = size.families[-1]
     for (family, filling, frozen), aim in aim_of.items():
@@ -295,9 +295,9 @@ def _cuts_words(cuts: tuple[int, ...]) -> str:
 def standing(throw: Scenario) -> Aim:
     """Return the throw onto a table where it would touch, standing, after the duration of the flight."""
     time, (_, v_y) = throw.duration, throw.launch_velocity
-    rest = centre_of_mass_at_rest(throw)
-    release = -rest * math.cos(throw.theta0)
-    height = release + v_y * time - throw.gravity * time**2 / 2 - (throw.bottle.length - rest)
+    r_cm_rest = centre_of_mass_at_rest(throw)
+    release = -r_cm_rest * math.cos(throw.theta0)
+    height = release + v_y * time - throw.gravity * time**2 / 2 - (throw.bottle.length - r_cm_rest)
     return Aim(throw=replace(throw, duration=time + SPARE), height=height, time=time)
 
 
@@ -357,13 +357,13 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
 def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
     """Return share, means and the interval of the mean bounces of the throws of one case."""
 
-    def known(name: str) -> list[float]:
+    def values_of(name: str) -> list[float]:
         return [abs(value) for row in rows if (value := getattr(row, name)) is not None]
 
     def mean(name: str) -> float:
-        return float(np.mean(values)) if (values := known(name)) else math.nan
+        return float(np.mean(values)) if (values := values_of(name)) else math.nan
 
-    bounces = known("bounces")
+    bounces = values_of("bounces")
     return Cell(
         aim=aim,
         share=replace(share_of(rows), rival=aim.rival),

@@ -214,16 +214,16 @@ class Share:
         )
 
 
-def correlation(one: Sequence[bool | None], other: Sequence[bool | None]) -> float:
+def correlation(stood: Sequence[bool | None], other_stood: Sequence[bool | None]) -> float:
     """Return phi of paired throws that stood or did not, with Newcombe's correction for continuity (1998, method 10).
 
     It is 0, that of independent samples, if the counts differ, if a throw is undecided (None), or if all end alike.
     """
-    if len(one) != len(other) or None in one or None in other:
+    if len(stood) != len(other_stood) or None in stood or None in other_stood:
         return 0.0
-    throws, first, second = len(one), sum(map(bool, one)), sum(map(bool, other))
+    throws, first, second = len(stood), sum(map(bool, stood)), sum(map(bool, other_stood))
     spread = first * (throws - first) * second * (throws - second)
-    both = sum(bool(a and b) for a, b in zip(one, other, strict=True))
+    both = sum(bool(a and b) for a, b in zip(stood, other_stood, strict=True))
     excess = float(throws * both - first * second)
     if excess > 0:
         excess = max(excess - throws / 2, 0.0)

@@ -110,8 +110,8 @@ def landed(touch: Touch, table: Table, program: str, law: str | None) -> Outcome
 
 def saddle(scenario: Scenario) -> float:
     """Return E_s = M g sqrt(R^2 + z_rest^2) [J]."""
-    rest = scenario.bottle.length - centre_of_mass_at_rest(scenario)
-    return scenario.total_mass * scenario.gravity * math.hypot(scenario.bottle.radius, rest)
+    z_rest = scenario.bottle.length - centre_of_mass_at_rest(scenario)
+    return scenario.total_mass * scenario.gravity * math.hypot(scenario.bottle.radius, z_rest)
 
 
 def touch_readings(touch: Touch) -> dict[str, Any]:

@@ -84,16 +84,16 @@ def study(ask: Ask) -> Study[Maps]:
     return {axis: attempt(mapped, axis) for axis in AXES}
 
 
-def claims(found: Maps) -> Claims:
+def claims(maps: Maps) -> Claims:
     """Yield which map could not be made."""
-    for axis, outcome in found.items():
+    for axis, outcome in maps.items():
         if outcome.result is None:
             yield Absent(f"map-{axis}", f"map over {axis}", outcome.reason, "observation")
 
 
-def figures(found: Maps) -> Iterator[Exhibit]:
+def figures(maps: Maps) -> Iterator[Exhibit]:
     """Yield every map."""
-    yield from map(_exhibit, results_of(found).values())
+    yield from map(_exhibit, results_of(maps).values())
 
 
 def _exhibit(study: ValidityMap) -> Exhibit:
@@ -170,8 +170,8 @@ def _within(study: ValidityMap) -> str:
     for words, error in errors(study):
         finite = error[np.isfinite(error)]
         cells = ", ".join(f"below {level:.0%} in {int((finite < level).sum())}" for level, _ in CONTOURS)
-        most = f", at most {finite.max():.2g}" if finite.size else ""
-        parts.append(f"The {words} is {cells} of {finite.size} cells{most}")
+        maximum = f", at most {finite.max():.2g}" if finite.size else ""
+        parts.append(f"The {words} is {cells} of {finite.size} cells{maximum}")
     return "; ".join(parts) + "."
 
 

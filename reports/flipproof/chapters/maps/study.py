@@ -259,11 +259,11 @@ def place_of(throw: Scenario, axis: Axis, steps: int) -> tuple[float, float]:
     return throw.fill_fraction, values[axis]
 
 
-def read_flight(made: RunResult) -> Reading:
+def read_flight(result: RunResult) -> Reading:
     """Return what a map needs of one run."""
-    flight = made.trajectory
+    flight = result.trajectory
     if flight is None:
-        return Reading(problem=word(made.reason))
+        return Reading(problem=word(result.reason))
     if not flight.ok:
         return Reading(problem=flight.status)
     times = np.linspace(0.0, flight.scenario.duration, CURVE)

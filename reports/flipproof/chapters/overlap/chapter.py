@@ -86,7 +86,9 @@ def plan_overlap(throw: Scenario, fills: Sequence[float], slices: int, dt: float
     }
 
 
-def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], made: Mapping[Run, RunResult]) -> Overlap:
+def study_overlap(
+    fills: Sequence[float], runs: Mapping[str, Sequence[Run]], results: Mapping[Run, RunResult]
+) -> Overlap:
     """Read the runs that ``plan_overlap`` planned over these fill fractions."""
 
     def read(result: RunResult) -> tuple[float, str]:
@@ -98,7 +100,7 @@ def study_overlap(fills: Sequence[float], runs: Mapping[str, Sequence[Run]], mad
             return np.nan, f"{flight.status}: {flight.message}"
         return plateau(flight.t, flight.omega, flight.scenario.omega0), ""
 
-    readings = {name: list(zip(*(read(made[run]) for run in curve), strict=True)) for name, curve in runs.items()}
+    readings = {name: list(zip(*(read(results[run]) for run in curve), strict=True)) for name, curve in runs.items()}
     level = {name: np.array(readings[name][0]) for name in (PASS, EXCLUDE, CHECK, COLUMN, RODS)}
     return Overlap(
         fills=np.asarray(fills),
@@ -122,11 +124,11 @@ class Amount(NamedTuple):
     brim_dt: float = 1e-5
 
 
-Found = tuple[Overlap, Trajectory | None]
+OverlapResult = tuple[Overlap, Trajectory | None]
 """The curves over the fill fraction of the report's throw, and the paper's own bottle filled to the brim."""
 
 
-def study(ask: Ask) -> Study[Found]:
+def study(ask: Ask) -> Study[OverlapResult]:
     """Let slices overlap, and not."""
     full = vary(ask.reference.with_slices(5), fill=1.0)
     settings = {"slices": "exclude", "dt": ask.work.brim_dt, "times": np.linspace(0.0, full.duration, 101)}
@@ -137,9 +139,9 @@ def study(ask: Ask) -> Study[Found]:
     return study_overlap(ask.work.fills, runs, flights), run if run is not None and run.ok else None
 
 
-def claims(found: Found) -> Claims:
+def claims(result: OverlapResult) -> Claims:
     """Yield that a full bottle is ice, and by how much it is not when slices overlap."""
-    overlap, full_bottle = found
+    overlap, full_bottle = result
     title, drift, note = "full bottle, slices exclude each other: largest |ω/ω₀ − 1|", None, ""
     if full_bottle is not None:
         drift = measure("", full_bottle).largest
@@ -166,9 +168,9 @@ def claim_column(study: Overlap) -> Finding:
     return observed("overlap-column", title, largest, note=note + (words or "not computed at any filling"))
 
 
-def figures(found: Found) -> Iterator[Exhibit]:
+def figures(result: OverlapResult) -> Iterator[Exhibit]:
     """Yield the plateau over the fill fraction, with slices that overlap and with slices that do not."""
-    study, _ = found
+    study, _ = result
     rows = "; ".join(
         f"filling {fill:.0%}: " + ", ".join(f"{name} {level[k]:.3f}" for name, level in study.level.items())
         for k, fill in enumerate(study.fills)
@@ -180,10 +182,10 @@ def figures(found: Found) -> Iterator[Exhibit]:
             columns[f"band {name} [1]"] = study.band
         if any(study.reason[name]):
             columns[f"missing because: {name}"] = study.reason[name]
-    cost, most = study.cost_to_column, ""
+    cost, max_note = study.cost_to_column, ""
     if np.isfinite(cost).any():
         k = int(np.nanargmax(np.abs(cost)))
-        most = f"; at most {cost[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
+        max_note = f"; at most {cost[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
     yield Exhibit(
         name="overlap",
         title="How far ω falls because slices may overlap",
@@ -191,7 +193,7 @@ def figures(found: Found) -> Iterator[Exhibit]:
         "down. In the same engine, slices that exclude each other keep the angular velocity of a full "
         "bottle. The two curves differ by the effect of overlap. Water as one stretching column cannot overlap either, "
         "and has no free parameter. Free flight minus the column is a difference of two exactly solved models (free "
-        f"flight at N = {study.throw.n_slices}) and not a share{most}. Rods "
+        f"flight at N = {study.throw.n_slices}) and not a share{max_note}. Rods "
         "are infinitely many slices that exclude each other and do not bounce. In the "
         "paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of 0.1 turns like ice. Bars: "
         "twice what halving the step changes.",

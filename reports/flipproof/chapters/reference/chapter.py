@@ -44,40 +44,40 @@ def witnessed(scenario: Scenario, model: str) -> dict[str, Any]:
 
 def claims(results: Results) -> Claims:
     """Yield that every model is confirmed."""
-    for model, (usual, witness, *others) in results.items():
+    for model, (usual, witness, *second_methods) in results.items():
         id_, title = f"reference-{model}", f"{model} is converged"
         yield judged(claim_reference_converged, usual, witness, id=id_, title=title)
-        for other in others:
+        for second in second_methods:
             id_, title = f"second-method-{model}", f"{model} by a second method"
-            yield judged(claim_second_method, usual, other, id=id_, title=title)
+            yield judged(claim_second_method, usual, second, id=id_, title=title)
 
 
 def claim_reference_converged(usual: Trajectory, witness: Trajectory) -> Finding:
     """An independent integration of all 2N + 1 equations with a tenth of the rest speed gives the same flight."""
-    settings, other = usual.settings, witness.settings
+    settings, finer = usual.settings, witness.settings
     # Where a slice that rests pushes the tube and one that bounces below the rest speed does not.
     wider = {"accelerating-origin": 1e-4, "free-flight": 3e-3}
     return claim_change(
         f"reference-{usual.method}",
-        f"{usual.method}: ω(t) is converged in rest speed, and solve_ivp {other['method']} confirms it",
+        f"{usual.method}: ω(t) is converged in rest speed, and solve_ivp {finer['method']} confirms it",
         usual,
         witness,
         wider.get(usual.method, BAND),
-        differ=settings["method"] != other["method"] and 10 * other["rest_speed"] <= settings["rest_speed"] * 1.001,
-        note=f"rest speed {settings['rest_speed']:g} → {other['rest_speed']:g} m/s; {settings['method']} → "
-        f"{other['method']}, rtol {other['rtol']:g}, longest step {other['max_step']:g} s",
+        differ=settings["method"] != finer["method"] and 10 * finer["rest_speed"] <= settings["rest_speed"] * 1.001,
+        note=f"rest speed {settings['rest_speed']:g} → {finer['rest_speed']:g} m/s; {settings['method']} → "
+        f"{finer['method']}, rtol {finer['rtol']:g}, longest step {finer['max_step']:g} s",
     )
 
 
-def claim_second_method(usual: Trajectory, other: Trajectory) -> Finding:
+def claim_second_method(usual: Trajectory, second: Trajectory) -> Finding:
     """A second integration method gives the same flight."""
     return claim_change(
         f"second-method-{usual.method}",
-        f"{usual.method}: {other.settings['method']} gives the same ω(t) as {usual.settings['method']}",
+        f"{usual.method}: {second.settings['method']} gives the same ω(t) as {usual.settings['method']}",
         usual,
-        other,
+        second,
         BAND,
-        differ=usual.settings["method"] != other.settings["method"],
+        differ=usual.settings["method"] != second.settings["method"],
     )
 
 

@@ -183,11 +183,11 @@ def read_panel(panel: Panel, flights: Flights, band: float) -> Panel:
     return replace(panel, cells=cells, band=band)
 
 
-def cell_of(made: RunResult, truth: Trajectory | None) -> Cell:
+def cell_of(result: RunResult, truth: Trajectory | None) -> Cell:
     """Return what became of a run; one that is whole is held against the reference."""
-    flight = made.trajectory
+    flight = result.trajectory
     if flight is None:
-        return Cell(reason=shortened(made.reason, 160))
+        return Cell(reason=shortened(result.reason, 160))
     if not flight.ok:
         grade = "sinks in" if flight.reason == "penetration" else "explodes"
         return Cell(grade, held_until=float(flight.t[-1]), reason=shortened(flight.message, 160))

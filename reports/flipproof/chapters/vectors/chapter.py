@@ -28,13 +28,13 @@ def claims(results: list[tuple[Vector, RunResult]]) -> Claims:
 
 def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:
     """The scheme reproduces what the published program prints, in the column with the largest deviation, too."""
-    off = deviations(vector, flight)
+    error = deviations(vector, flight)
     # The two sides differ by the order of additions and, for MATLAB, by amplified round-off.
     admissible = {"published-python": (0.0, 1e-10), "published-matlab": (0.0, 1e-8)}
-    worst = max(off, key=lambda column: math.inf if math.isnan(off[column]) else off[column])
+    worst = max(error, key=lambda column: math.inf if math.isnan(error[column]) else error[column])
     title = f"{vector.scheme} reproduces the output of the paper's program, {vector.name}"
-    note = f"largest in column {worst}, over {len(off)} columns"
-    return regression(f"vectors-{vector.name}", title, float(off[worst]), "relative", admissible[vector.scheme], note)
+    note = f"largest in column {worst}, over {len(error)} columns"
+    return regression(f"vectors-{vector.name}", title, float(error[worst]), "relative", admissible[vector.scheme], note)
 
 
 CHAPTER: Final = Chapter(

@@ -67,7 +67,7 @@ class Shown(NamedTuple):
     times: tuple[str, ...]
     rows: tuple[Row, ...]
     recorded: Any
-    own: Any
+    own_fluid: Any
     curves: tuple[float, ...]
     statements: tuple[Held, ...]
     agrees: str
@@ -75,42 +75,42 @@ class Shown(NamedTuple):
     limits: str = LIMITS
 
 
-def claims(found: Water) -> Claims:
+def claims(water: Water) -> Claims:
     """Yield how far every equation lies from the fluids, and what the water's own inertia changes."""
     for equation in EQUATIONS:
         title = f"{equation}: r.m.s. distance of the plateau from the band of three fluids, fillings from a quarter on"
-        misses = ", ".join(f"{found.miss(equation, fill):+.3f} at {fill:g}" for fill in fluids()["fillings"][1:])
+        misses = ", ".join(f"{water.miss(equation, fill):+.3f} at {fill:g}" for fill in fluids()["fillings"][1:])
         value, slices = (
-            _finite(found.distance(equation)),
-            "" if equation in (DISCS, RODS, COLUMN) else f"N = {found.slices}; ",
+            _finite(water.distance(equation)),
+            "" if equation in (DISCS, RODS, COLUMN) else f"N = {water.slices}; ",
         )
         note = f"{slices}{misses}; two fluids recorded, one our own; {EQUATIONS[equation]}"
         id_ = f"water-{'rods-discs' if equation == DISCS else equation}"
         yield observed(id_, title, value, "of ω₀", note)
-    for equation, change in found.own_inertia.items():
+    for equation, change in water.own_inertia.items():
         title = f"{equation}, half full: change of the plateau by the water's own inertia, M_w R²/4 as of discs"
         note = "17 % of J₀ at a quarter to a half; the paper leaves it out by cutting water into points"
         yield observed(f"water-own-inertia-{equation}", title, _finite(change), "of ω₀", note)
 
 
-def verdict(found: Water) -> Shown:
+def verdict(water: Water) -> Shown:
     """Return the table of the page."""
     wanted = tuple(float(fill) for fill in fluid_band()[0])
-    late = late_fluid()
+    flights = late_fluid()
     starts = {float(f): f"{a:.2f} to {b:.2f}" for f, a, b in zip(*start_band(), strict=True)}
     rows = tuple(
         Row(
             name_of(equation),
             tuple(
                 (
-                    f"{found.at(equation, f):.3f}",
-                    f"{found.miss(equation, f):+.3f}" if found.miss(equation, f) else "inside",
+                    f"{water.at(equation, f):.3f}",
+                    f"{water.miss(equation, f):+.3f}" if water.miss(equation, f) else "inside",
                 )
                 for f in wanted
             ),
-            f"{found.distance(equation):.3f}",
-            tuple(f"{value:.3f}" for value in found.apart[equation].values()),
-            tuple(_seconds(found.time(equation, f)) for f in late),
+            f"{water.distance(equation):.3f}",
+            tuple(f"{value:.3f}" for value in water.apart[equation].values()),
+            tuple(_seconds(water.time(equation, f)) for f in flights),
             why,
         )
         for equation, why in EQUATIONS.items()
@@ -121,11 +121,11 @@ def verdict(found: Water) -> Shown:
         _ranges(recorded_band()),
         _ranges(own_band()),
         tuple(starts.get(f, "–") for f in wanted),
-        tuple(f"{f:g}: {_seconds(flight['early'])}" for f, flight in late.items()),
+        tuple(f"{f:g}: {_seconds(flight['early'])}" for f, flight in flights.items()),
         tuple(sorted(rows, key=lambda row: float(row.distance))),
         fluids(),
         own_fluid(),
-        tuple(late),
+        tuple(flights),
         (statements := held()),
         standing(statements),
     )
@@ -139,15 +139,15 @@ def _seconds(time: float) -> str:
     return f"{time:.3f} s" if math.isfinite(time) else "never"
 
 
-def figures(found: Water) -> Iterator[Exhibit]:
+def figures(water: Water) -> Iterator[Exhibit]:
     """Yield the plateau over the filling."""
     fills, low, high = fluid_band()
     columns: dict[str, Any] = {"fill fraction [1]": FILLS}
-    columns |= {f"plateau of omega/omega_0 {name} [1]": level for name, level in found.level.items()}
+    columns |= {f"plateau of omega/omega_0 {name} [1]": level for name, level in water.level.items()}
     columns |= {"fill fraction of fluids [1]": fills, "lowest fluid [1]": low, "highest fluid [1]": high}
     columns |= {"lowest of our own fluid [1]": own_band()[1], "highest of our own fluid [1]": own_band()[2]}
     plateaus = "; ".join(
-        f"{name_of(name)}: " + ", ".join(f"{found.at(name, f):.3f} at {f:g}" for f in fluids()["fillings"])
+        f"{name_of(name)}: " + ", ".join(f"{water.at(name, f):.3f} at {f:g}" for f in fluids()["fillings"])
         for name in EQUATIONS
     )
     band = ", ".join(f"{a:.2f} to {b:.2f} at {f:g}" for f, a, b in zip(fills, low, high, strict=True))
@@ -161,7 +161,7 @@ def figures(found: Water) -> Iterator[Exhibit]:
         "for this report.",
         alt=f"Line plot of the plateau of omega over omega_0 against the fill fraction. Fluids {band}. {plateaus}.",
         maker=figure_water,
-        data=(found,),
+        data=(water,),
         table=columns_csv(columns),
     )
 
@@ -177,7 +177,7 @@ LOOKS: Final[dict[str, dict[str, Any]]] = {
 
 
 @styled
-def figure_water(found: Water) -> Figure:
+def figure_water(water: Water) -> Figure:
     """Plateau over filling: a line for each equation, the fluids as a band, the starts as bars."""
     figure, axes = new_figure(size=(8.0, 4.6))
     fills, low, high = recorded_band()
@@ -190,23 +190,23 @@ def figure_water(found: Water) -> Figure:
     bars = {"fmt": "none", "ecolor": "#222222", "capsize": 4, "label": "two fluids, by the start of their water"}
     axes.errorbar(at, middle, yerr=(highest - lowest) / 2, **bars)
     for equation, look in LOOKS.items():
-        axes.plot(FILLS, found.level[equation], label=name_of(equation), marker=".", **look)
+        axes.plot(FILLS, water.level[equation], label=name_of(equation), marker=".", **look)
     axes.set(xlim=(0.0, 1.05), ylim=(0.0, 1.08))
     axes.set(xlabel="fill fraction M_w / M_max [1]", ylabel="mean of ω/ω₀ over the second half [1]")
-    axes.set_title(f"the paper's throw, N = {found.slices} where there are slices", fontsize=10, loc="left")
+    axes.set_title(f"the paper's throw, N = {water.slices} where there are slices", fontsize=10, loc="left")
     shared_legend(figure, axes, columns=3)
     return figure
 
 
-def summary(found: Water) -> dict[str, Any]:
+def summary(water: Water) -> dict[str, Any]:
     """Return the plateaus and what each misses, by equation and filling, and the band of all fluids."""
     wanted = fluids()["fillings"]
     rows = [
         {
             "name": name,
-            "distance": _finite(found.distance(name)),
+            "distance": _finite(water.distance(name)),
             "fillings": [
-                {"id": f"{f:g}", "plateau": _finite(found.at(name, f)), "miss": _finite(found.miss(name, f))}
+                {"id": f"{f:g}", "plateau": _finite(water.at(name, f)), "miss": _finite(water.miss(name, f))}
                 for f in wanted
             ],
         }

@@ -56,14 +56,14 @@ def flights(*, suction: bool) -> CaseFlights:
     """Return the recorded flights over the filling; half of the cells tells how sure a number is."""
     fine, coarse = (
         {
-            case.key: _made(case.scenario, curve)
+            case.key: _recorded_flight(case.scenario, curve)
             for case in family("filling")
             if (curve := _curve(case.value, cells, suction))
         }
         for cells in (OWN_CELLS, OWN_CELLS // 2)
     )
     name = NAMES[suction]
-    return CaseFlights(solver=name, made=fine, halved=CaseFlights(solver=name, made=coarse))
+    return CaseFlights(solver=name, results=fine, halved=CaseFlights(solver=name, results=coarse))
 
 
 def _curve(filling: float, cells: int, suction: bool) -> list[float] | None:
@@ -76,7 +76,7 @@ def _curve(filling: float, cells: int, suction: bool) -> list[float] | None:
     return None
 
 
-def _made(scenario: Scenario, curve: list[float]) -> RunResult:
+def _recorded_flight(scenario: Scenario, curve: list[float]) -> RunResult:
     """Return a recorded curve as a flight without slices; theta is its integral by the rule of trapezia.
 
     Centre of mass and inertia are not recorded and stand as 0: the statements are about the turning alone.

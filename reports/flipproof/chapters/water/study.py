@@ -90,8 +90,8 @@ def own_band() -> tuple[FloatArray, FloatArray, FloatArray]:
 def fluid_band() -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the fillings of the fluids, and the lowest and the highest plateau of any fluid there, shape (F,)."""
     fills, *recorded = recorded_band()
-    _, *own = own_band()
-    return fills, np.fmin(recorded[0], own[0]), np.fmax(recorded[1], own[1])
+    _, *ideal = own_band()
+    return fills, np.fmin(recorded[0], ideal[0]), np.fmax(recorded[1], ideal[1])
 
 
 def start_band() -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -153,11 +153,11 @@ def study(ask: Ask) -> Study[Water]:
     cut = ask.reference
     runs = {(equation, filling): _run(equation, filling, ask) for equation in EQUATIONS for filling in FILLS}
     half = {
-        (equation, own): Run(
-            equation, cut, {"times": _times(ask), "own_inertia": own}, f"water, {equation}, own inertia {own}"
+        (equation, counted): Run(
+            equation, cut, {"times": _times(ask), "own_inertia": counted}, f"water, {equation}, own inertia {counted}"
         )
         for equation in ("free-flight", RODS)
-        for own in (False, True)
+        for counted in (False, True)
     }
     flights = yield [*runs.values(), *half.values()]
     level, early = (
@@ -170,8 +170,8 @@ def study(ask: Ask) -> Study[Water]:
         }
         for equation in EQUATIONS
     }
-    own = {name: _level(flights[half[name, True]]) - _level(flights[half[name, False]]) for name, _ in half}
-    return Water(slices=cut.n_slices, level=level, early=early, apart=apart, own_inertia=own)
+    inertia_change = {name: _level(flights[half[name, True]]) - _level(flights[half[name, False]]) for name, _ in half}
+    return Water(slices=cut.n_slices, level=level, early=early, apart=apart, own_inertia=inertia_change)
 
 
 def _times(ask: Ask) -> FloatArray:

@@ -38,11 +38,11 @@ def study(ask: Ask) -> Study[tuple[Waterfall, ...]]:
     return split_all(program_run(cut, ask.steps), dict(chain.from_iterable(observed)))
 
 
-def claims(found: tuple[Waterfall, ...]) -> Claims:
+def claims(waterfalls: tuple[Waterfall, ...]) -> Claims:
     """Yield the whole difference of every observable, with its largest share; and what overlap changes of the first."""
-    for waterfall in found:
+    for waterfall in waterfalls:
         yield claim_waterfall(waterfall)
-    yield claim_overlap(found[0])
+    yield claim_overlap(waterfalls[0])
 
 
 def claim_waterfall(waterfall: Waterfall) -> Finding:
@@ -76,9 +76,9 @@ def claim_overlap(waterfall: Waterfall) -> Finding:
     return observed("waterfall-overlap", title, waterfall.overlap, note=note, band=Band(waterfall.end_band, "twins"))
 
 
-def figures(found: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
+def figures(waterfalls: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
     """Yield the split of the plateau."""
-    waterfall = found[0]
+    waterfall = waterfalls[0]
     bars = ", ".join(f"{bar.name} {bar.average:+.3f}" for bar in waterfall.bars)
     yield Exhibit(
         name="waterfall",

@@ -53,9 +53,9 @@ def claims(study: WorkPrecision) -> Iterator[Finding]:
 def _pair(study: WorkPrecision, first_key: str, second_key: str) -> Finding:
     """Compare two contenders of one equation at the smallest error that both keep."""
     first, second = study.curves[first_key], study.curves[second_key]
-    name, other = first.contender.name, second.contender.name
-    id_ = f"work-{name}-{other}".replace(" ", "-")
-    title = f"steps of {name} for one of {other}, at equal error against {first.contender.equation}"
+    name, rival = first.contender.name, second.contender.name
+    id_ = f"work-{name}-{rival}".replace(" ", "-")
+    title = f"steps of {name} for one of {rival}, at equal error against {first.contender.equation}"
     for error in (10.0 ** (-k / 2) for k in range(22, 1, -1)):
         steps_a, steps_b = first.price(error, "steps"), second.price(error, "steps")
         if steps_a is not None and steps_b is not None:
@@ -71,7 +71,7 @@ def _pair(study: WorkPrecision, first_key: str, second_key: str) -> Finding:
 
     limit = {(False, True): "at least, ", (True, False): "at most, "}.get((steps_a.bound, steps_b.bound), "")
     count_a, count_b = (f"{'at most ' if steps.bound else ''}{steps.value:.0f}" for steps in (steps_a, steps_b))
-    note = f"error {error:.1e} of ω₀: {count_a} steps of {name}, {count_b} of {other}; "
+    note = f"error {error:.1e} of ω₀: {count_a} steps of {name}, {count_b} of {rival}; "
     note += f"{against('work', 'updates of one slice')}, {against('seconds', 'ms of processor time', 1e3)}"
     return observed(id_, limit + title, steps_a.value / steps_b.value, note=note)
 
@@ -89,10 +89,10 @@ def _cheapest(study: WorkPrecision, error: float) -> Finding:
 
     work = ranked("work")
     keepers = {name for _, name in work}
-    others = [curve.contender.name for curve in curves if curve.contender.name not in keepers]
+    too_coarse = [curve.contender.name for curve in curves if curve.contender.name not in keepers]
     title = f"eq8 to {error:.0e} of ω₀: updates of the second cheapest over the cheapest"
     note = f"updates: {words('work', '')}; processor time: {words('seconds', ' s')}"
-    note += f"; not reached by {', '.join(others)}" if others else ""
+    note += f"; not reached by {', '.join(too_coarse)}" if too_coarse else ""
     ratio = work[1][0].value / work[0][0].value if len(work) > 1 else None
     return observed(f"work-cheapest-eq8-{error:.0e}", title, ratio, note=note)
 
@@ -101,8 +101,8 @@ def _floors(study: WorkPrecision) -> Finding:
     floors = {name: reference.floor for name, reference in study.references.items() if math.isfinite(reference.floor)}
     highest = max(floors, key=lambda name: floors[name])
     at = [curve.contender.name for curve in study.of(highest) if any(point.at_floor for point in curve.points)]
-    others = ", ".join(f"{name} {floor:.0e}" for name, floor in floors.items() if name != highest)
-    note = f"{highest}; at the floor: {', '.join(at) or 'none'}; others: {others}"
+    other_floors = ", ".join(f"{name} {floor:.0e}" for name, floor in floors.items() if name != highest)
+    note = f"{highest}; at the floor: {', '.join(at) or 'none'}; others: {other_floors}"
     title = "highest floor of a reference, below which no contender is ranked"
     return observed("work-floor", title, floors[highest], "of ω₀", note)
 
@@ -179,14 +179,14 @@ def tabulate(study: WorkPrecision) -> Table:
     columns = ("contender", "equation", "error, first to last level", "order in cost", *prices, "seconds for 1e-03")
     rows = []
     for curve in study.curves.values():
-        who, whole, failed = (curve.contender.name, curve.contender.equation), curve.whole, curve.failed
+        names, whole, failed = (curve.contender.name, curve.contender.equation), curve.whole, curve.failed
         reached = f"{whole[0].error:.1e} to {whole[-1].error:.1e}" if whole else "–"
         reached += " (floor)" if any(point.at_floor for point in whole) else ""
         order = f"{curve.slope.order:.2f} ± {curve.slope.error:.2f}"
         order = f"– ({curve.slope.reason})" if curve.slope.reason else order
         costs = [*(curve.price(error) for error in errors), curve.price(1e-3, "seconds")]
         why = f"{len(failed)} of {len(curve.points)}: {failed[0].settings}: {failed[0].reason}" if failed else ""
-        rows.append((*who, reached, order, *(cost.text if cost else "–" for cost in costs), why))
+        rows.append((*names, reached, order, *(cost.text if cost else "–" for cost in costs), why))
     return Table((*columns, "failed"), rows)
 
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flipproof.chapters.work_precision.study import Curve, WorkPrecision
-from flipproof.figures.style import OTHERS, STYLES, new_figure, styled
+from flipproof.figures.style import EXTRA_COLOURS, STYLES, new_figure, styled
 from ode_reference.models import MODELS
 
 COLOURS: Final = {"DOP853": "#000000", "LSODA": "#0050A0", "Radau": "#6A5ACD"}
@@ -62,7 +62,7 @@ def _curve(axes: Axes, curve: Curve, k: int) -> None:
     """Draw a curve, the ``k``-th of its family: the line tells the family, the marker who within it."""
     contender, floor = curve.contender, curve.reference.floor
     style = STYLES.get(contender.name)
-    colour = style["color"] if style else COLOURS.get(contender.name, OTHERS[k % len(OTHERS)])
+    colour = style["color"] if style else COLOURS.get(contender.name, EXTRA_COLOURS[k % len(EXTRA_COLOURS)])
     marker = MARKERS[contender.family][k % len(MARKERS[contender.family])]
     whole = [point for point in curve.whole if math.isfinite(point.work)]
     failed = [point.work for point in curve.failed if math.isfinite(point.work)]

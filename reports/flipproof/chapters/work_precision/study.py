@@ -146,13 +146,13 @@ class WorkPrecision:
         return tuple(curve for curve in self.curves.values() if curve.contender.equation == equation)
 
 
-def study_work_precision(plan: Plan, made: Mapping[Run, RunResult]) -> WorkPrecision:
+def study_work_precision(plan: Plan, results: Mapping[Run, RunResult]) -> WorkPrecision:
     """Read the runs of a plan; raise Missing if one does not hold the common times."""
-    references = {name: _reference([made[run] for run in runs]) for name, runs in plan.references.items()}
+    references = {name: _reference([results[run] for run in runs]) for name, runs in plan.references.items()}
     curves = {}
     for rival in plan.rivals:
         reference = references[rival.equation]
-        points = tuple(_point([made[run] for run in level], reference) for level in rival.levels)
+        points = tuple(_point([results[run] for run in level], reference) for level in rival.levels)
         slope = _slope(points, reference.floor)
         curves[rival.key] = Curve(contender=rival, reference=reference, points=points, slope=slope)
     return WorkPrecision(throw=plan.throw, references=references, curves=curves)
