@@ -19,8 +19,8 @@ from pathlib import Path
 import lesson_page
 import reference
 
-HERE = Path(__file__).resolve().parent
-ROOT = HERE.parent
+FOLDER = Path(__file__).resolve().parent
+ROOT = FOLDER.parent
 PAGES = {
     "README.md": "Start", "docs/tutorial.md": "A lesson", "docs/theory.md": "Theory", "docs/water.md": "Water",
     "docs/landing.md": "The landing", "docs/own-solver.md": "Your own solver", "docs/bounce.md": "Bounces",
@@ -56,10 +56,10 @@ img { max-width: 100%; }
 def typeset(text: str) -> str:
     """Return a formula of plain text with Greek letters, sub- and superscripts and primes, as HTML."""
     text = re.sub(
-        r"\b(" + "|".join(GREEK) + r")(?=\b|_|\d)", lambda found: GREEK[found.group()], html.escape(text, quote=False)
+        r"\b(" + "|".join(GREEK) + r")(?=\b|_|\d)", lambda match: GREEK[match.group()], html.escape(text, quote=False)
     )
-    text = re.sub(r"\^(\([^)]*\)|-?\w+)", lambda found: f"<sup>{found.group(1).strip('()')}</sup>", text)
-    text = re.sub(r"(?<=\w)_(\([^)]*\)|\w+)", lambda found: f"<sub>{found.group(1).strip('()')}</sub>", text)
+    text = re.sub(r"\^(\([^)]*\)|-?\w+)", lambda match: f"<sup>{match.group(1).strip('()')}</sup>", text)
+    text = re.sub(r"(?<=\w)_(\([^)]*\)|\w+)", lambda match: f"<sub>{match.group(1).strip('()')}</sub>", text)
     return (
         text.replace("''", "″")
         .replace("'", "′")
@@ -84,11 +84,11 @@ def page_of(path: Path, current: str, *, report: bool, lesson: bool) -> str:
 
     text = path.read_text(encoding="utf-8").replace("](../", "](")
     text = re.sub(
-        r"\]\((?:docs/)?([\w-]+)\.md(#[\w-]+)?\)", lambda found: f"]({found.group(1)}.html{found.group(2) or ''})", text
+        r"\]\((?:docs/)?([\w-]+)\.md(#[\w-]+)?\)", lambda match: f"]({match.group(1)}.html{match.group(2) or ''})", text
     )
-    made = str(markdown2.markdown(text, extras=["tables", "fenced-code-blocks", "header-ids"]))
-    made = re.sub(r"<pre><code>(.*?)</code></pre>", lambda found: _block(found.group(1)), made, flags=re.DOTALL)
-    return site_page(PAGES[current], made, current, report=report, lesson=lesson)
+    body = str(markdown2.markdown(text, extras=["tables", "fenced-code-blocks", "header-ids"]))
+    body = re.sub(r"<pre><code>(.*?)</code></pre>", lambda match: _block(match.group(1)), body, flags=re.DOTALL)
+    return site_page(PAGES[current], body, current, report=report, lesson=lesson)
 
 
 def site_page(name: str, body: str, current: str, *, report: bool, lesson: bool) -> str:
@@ -138,7 +138,7 @@ def build(out: Path, report: Path | None = None) -> None:
         target = out / f"{Path(file).stem}.html"
         target.write_text(page_of(ROOT / file, file, **has), encoding="utf-8")
     shutil.copyfile(out / "README.html", out / "index.html")
-    for picture in HERE.glob("*.svg"):
+    for picture in FOLDER.glob("*.svg"):
         shutil.copyfile(picture, out / picture.name)
     for page in out.glob("*.html"):
         for target in re.findall(r'(?:href|src)="([^"#:]+)"', page.read_text(encoding="utf-8")):

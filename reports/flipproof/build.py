@@ -84,9 +84,9 @@ def gather_report(
 
     Slow runs and calls are looked for in the ``store`` and kept there.
     """
-    with workers(None) if pool is None else nullcontext(pool) as made_by:
-        compile_kernels(made_by)
-        return gather(contents or parts(), ask, made_by, progress, work=work, stages=stages, store=store)
+    with workers(None) if pool is None else nullcontext(pool) as executor:
+        compile_kernels(executor)
+        return gather(contents or parts(), ask, executor, progress, work=work, stages=stages, store=store)
 
 
 def build(
@@ -110,9 +110,9 @@ def build(
             progress,
             png=png,
         )
-    rest = iter(exhibits)
+    remaining = iter(exhibits)
     results = {
-        name: replace(result, figures=tuple(islice(rest, len(result.figures)))) for name, result in results.items()
+        name: replace(result, figures=tuple(islice(remaining, len(result.figures)))) for name, result in results.items()
     }
     summary = summarise(gathered, results, provenance, verdict(gathered))
     with gathered.stages.lap("page"):

@@ -227,7 +227,7 @@ def test_a_guest_is_asked_anew_though_the_store_has_the_ladder(tmp_path):
         file.write_text(file.read_text().replace("naive RK4" if name == "one" else "one", name))
         with RunStore(tmp_path / "runs.sqlite", slow=0.0) as store:
             labels += [guest.label for guest in Reported(f"{file}:Eq8", chapters=("guests",), store=store).guests]
-            kept.append(len(store.found))
+            kept.append(len(store.run_hits))
     assert labels == ["one", "other"]
     assert kept[0] == 0 < kept[1]
 

@@ -500,9 +500,9 @@ def gathered(throw, store=None):
 def test_the_chapter_makes_the_same_and_finds_it_in_the_store(found, tmp_path):
     with RunStore(tmp_path / "runs.sqlite", slow=0.0) as store:
         made = gathered(THROW, store).result("landing")
-        assert not store.found_calls
+        assert not store.call_hits
         again = gathered(THROW, store).result("landing")
-        assert 2 * len(store.found_calls) == store.calls > 4
+        assert 2 * len(store.call_hits) == store.calls > 4
     assert shares_csv(made) == shares_csv(found) == shares_csv(again)
 
 

@@ -348,7 +348,7 @@ def test_landing_claims_read_the_moment_the_bottle_is_upright():
         (slow, "fails", "fails"),
     ):
         judgement = judge(BY_ID["landing-velocity"], moving)
-        others = dict(judgement.others)
+        others = dict(judgement.senses)
         assert judgement.verdict == towards_base
         assert others["as negative dr_CM/dt, towards the cap, at θ = 2π"].verdict == towards_cap
         assert {math.copysign(1.0, each.deciding.value) for each in (judgement, *others.values())} == {
@@ -415,7 +415,7 @@ def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
     assert judgement.verdict == "holds"
     assert judgement.deciding.value == pytest.approx(9.7, abs=0.05)
     assert judgement.readings[0].admissible == pytest.approx((20.0 / math.sqrt(10.0), 20.0 * math.sqrt(10.0)))
-    ((_, strict),) = judgement.others
+    ((_, strict),) = judgement.senses
     assert strict.verdict == "fails"
     assert strict.readings[0].admissible == pytest.approx((16.0, 25.0))
 
@@ -423,7 +423,7 @@ def test_launch_speed_and_spin_of_the_paper_agree_in_order_of_magnitude_only():
 def test_work_of_the_programs_is_linear_in_slices_and_square_in_intervals_only_where_history_is_copied():
     flights = flown({})
     found = {name: judge(BY_ID[name], flights) for name in ("cost-slices", "cost-intervals", "cost-steps")}
-    python = {name: dict(each.others)["in the Python program, which copies no history"] for name, each in found.items()}
+    python = {name: dict(each.senses)["in the Python program, which copies no history"] for name, each in found.items()}
     assert {name: each.verdict for name, each in found.items()} == {
         "cost-slices": "fails", "cost-intervals": "holds", "cost-steps": "holds"
     }  # fmt: skip
@@ -455,7 +455,7 @@ def test_the_senses_of_non_monotonic_angles():
         (back, letter, "holds"),
         (falls, letter, "fails"),
     ):
-        assert dict(judge(BY_ID["strong-drag-turns-back"], flights).others)[read_as].verdict == verdict
+        assert dict(judge(BY_ID["strong-drag-turns-back"], flights).senses)[read_as].verdict == verdict
 
 
 def test_the_filling_of_the_slow_down_is_interpolated():
@@ -513,7 +513,7 @@ def test_other_readings_of_the_text_stand_beside_the_verdict():
     )  # fmt: skip
     judgement = judge(twofold, flown({}, "s"))
     assert judgement.verdict == "holds"
-    assert [(sense, each.verdict) for sense, each in judgement.others] == [
+    assert [(sense, each.verdict) for sense, each in judgement.senses] == [
         ("the other way", "fails"), ("a third", "cannot be decided")
     ]  # fmt: skip
     assert judgement.words.endswith(
@@ -654,7 +654,7 @@ def test_numbers_behind_those_verdicts(statements, id_, value, within):
 def test_the_delay_of_the_release_angle_in_three_senses(statements):
     """A stretch of time takes out more of the delay than a shift: the decrease itself takes longer."""
     judgement = by_program(statements["release-angle"])
-    senses = (judgement, *dict(judgement.others).values())
+    senses = (judgement, *dict(judgement.senses).values())
     assert [(each.verdict, round(each.deciding.value, 4)) for each in senses] == [
         ("holds", 0.0432), ("fails", 0.0551), ("fails", 0.0651)
     ]  # fmt: skip
@@ -708,7 +708,7 @@ def test_the_page_shows_every_verdict_with_word_sign_and_number(runs, read_page)
     assert {f"paper-{claim.id}" for claim in CLAIMS} <= set(page.ids)
     # Once in the table and once in the list of all numbers; in the table every other sense of the text too.
     judged = [(s, j) for s in verdicts.statements for j in s.judgements]
-    others = [other for s, j in judged if s.kind == "claim" for _, other in j.others]
+    others = [other for s, j in judged if s.kind == "claim" for _, other in j.senses]
     failed = sum(j.verdict == "fails" for s, j in judged if s.kind == "claim")
     assert text.count("✗ fails") == 2 * failed + sum(other.verdict == "fails" for other in others)
     assert text.count("has this limit") == 2 * sum(s.word(j).startswith("has this limit") for s, j in judged)

@@ -24,7 +24,7 @@ STEPS: Final = (4.0, 2.0, 1.0, 0.5)
 """Steps of the studies of energy and order, in units of the passport's step."""
 
 GRAVITY: Final = 9.81
-OFF: Final = 2e-3
+REMARKED_ERROR: Final = 2e-3
 """Difference of a restitution from the one asked that is remarked."""
 
 
@@ -129,7 +129,7 @@ def contract(adapter: Adapter, dt: float) -> Measurement:
 def free_fall(adapter: Adapter, dt: float) -> Measurement:
     """Free fall before the first impact, under two gravities, one of them not the Earth's."""
     errors: dict[str, list[float]] = {}
-    off = []
+    remarks = []
     for gravity in (GRAVITY, 3.7, 0.0):
         rows = []
         for step in STEPS:
@@ -139,13 +139,13 @@ def free_fall(adapter: Adapter, dt: float) -> Measurement:
         errors[f"{gravity:g}"] = rows
         acts = float((v[0] - v[-1]) / (t[-1] - t[0]))
         if not abs(acts - gravity) <= 1e-3 * max(gravity, 1.0):
-            off.append(f"gravity acts with {acts:.5g} m/s^2 where {gravity:g} was asked")
+            remarks.append(f"gravity acts with {acts:.5g} m/s^2 where {gravity:g} was asked")
     worst = max(errors.values(), key=max)
     slope = convergence(worst)
     return Measurement(
         "free fall",
         f"height after 0.5 s is off by {worst[2]:.1e} m at a step of {dt:g} s ({_of_order(slope)})",
-        "; ".join(off),
+        "; ".join(remarks),
         {"errors_m": errors, "steps_s": [step * dt for step in STEPS]},
     )
 
@@ -162,7 +162,7 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
         [[[ratio(adapter, v, e, dt, p) for p in PHASES] for v in SPEEDS] for e in RESTITUTIONS]
     )  # (e, speed, phase)
     nominal = np.array(RESTITUTIONS)[:, None, None]
-    off, bounces, sinks = np.abs(table - nominal), table > nominal / 2, table < -OFF
+    errors, bounces, sinks = np.abs(table - nominal), table > nominal / 2, table < -REMARKED_ERROR
     remarks = []
     if sinks.any():
         e, slowest = RESTITUTIONS[int(np.argmax(sinks.any((1, 2))))], SPEEDS[int(np.argmax(sinks.any((0, 2))))]
@@ -170,7 +170,7 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
     dead = [v for k, v in enumerate(SPEEDS) if not bounces[2:, k].any()]
     fast = [v for k, v in enumerate(SPEEDS) if bounces[2:, k].all()]
     threshold = math.nan
-    counted = np.ones(off.shape[:2], dtype=bool)
+    counted = np.ones(errors.shape[:2], dtype=bool)
     if dead and max(fast, default=0.0) > max(dead):
         slow, threshold = (_threshold(adapter, e, dt) for e in (0.5, 0.8))
         # Some engines drop impacts that are slow, others rebounds that would be.
@@ -180,16 +180,16 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
         counted = np.multiply.outer(RESTITUTIONS if of_rebound else np.ones(len(RESTITUTIONS)), SPEEDS) > threshold
     elif dead:
         remarks.append(f"nothing rebounds at {', '.join(f'{v:.2g}' for v in dead)} m/s")
-    seen = np.where(sinks, 0.0, off * counted[..., None])
+    seen = np.where(sinks, 0.0, errors * counted[..., None])
     k, s, p = (int(index) for index in np.unravel_index(int(np.argmax(seen)), seen.shape))
     worst = float(seen[k, s, p])
-    if not worst <= OFF:
+    if not worst <= REMARKED_ERROR:
         remarks.append(
             f"restitution is off by up to {worst:.2g} (asked {RESTITUTIONS[k]:g}, got {table[k, s, p]:.4g} at "
             f"{SPEEDS[s]:.2g} m/s)"
         )
     spread = float(np.where(sinks.any(2), 0.0, table.max(2) - table.min(2))[counted].max())
-    if not spread <= OFF:
+    if not spread <= REMARKED_ERROR:
         remarks.append(f"the rebound hangs on the phase of the step by up to {spread:.2g}")
     return Measurement(
         "restitution",
@@ -255,7 +255,7 @@ def _returns(adapter: Adapter, dt: float) -> tuple[float, float, FloatArray] | N
 
     None if an elastic hit is not returned.
     """
-    late = {}
+    delays = {}
     for speed in (2.0, 8.0):
         rows = []
         for phase in np.arange(16) / 16 + 1 / 37:
@@ -264,8 +264,8 @@ def _returns(adapter: Adapter, dt: float) -> tuple[float, float, FloatArray] | N
             if v[-1] <= 0:
                 return None
             rows.append(float(t[-1] - y[-1] / v[-1] - height / speed))
-        late[speed] = np.array(rows)
-    slow, fast = late[2.0], late[8.0]
+        delays[speed] = np.array(rows)
+    slow, fast = delays[2.0], delays[8.0]
     # A floor that lies higher by s returns a body earlier by 2 s / speed; a delay is the same for both.
     shift = float((fast.mean() - slow.mean()) / (1 / 2.0 - 1 / 8.0) / 2)
     return shift, float(fast.mean() + 2 * shift / 8.0), fast
@@ -332,11 +332,11 @@ def rest(adapter: Adapter, dt: float) -> Measurement:
     """Whether a body comes to rest: e = 0.5 from 0.1 m, where the exact impacts end after 0.43 s."""
     over = exact.rest_time(0.1, 0.5, GRAVITY)
     t, y, v = adapter.drop(0.1, 0.0, 0.5, GRAVITY, dt, over + 1.0)
-    late = t > over + 0.5
-    low, high, speed = float(y[late].min()), float(y[late].max()), float(np.abs(v[late]).max())
+    tail = t > over + 0.5
+    low, high, speed = float(y[tail].min()), float(y[tail].max()), float(np.abs(v[tail]).max())
     remarks = []
     if not high - low <= 1e-3:
-        moves = "hops" if v[late].max() > 1e-3 > -1e-3 > v[late].min() else "sinks" if y[-1] < y[late][0] else "rises"
+        moves = "hops" if v[tail].max() > 1e-3 > -1e-3 > v[tail].min() else "sinks" if y[-1] < y[tail][0] else "rises"
         remarks.append(f"half a second after its last exact impact the body still {moves} {(high - low) * 1e3:.2g} mm")
     elif not abs(low) <= 1e-3:
         remarks.append(f"it rests {abs(low) * 1e3:.2g} mm {'above' if low > 0 else 'below'} the floor")
@@ -385,10 +385,10 @@ def pairs(adapter: Adapter, dt: float) -> Measurement:
         for e in (0.0, 0.5, 1.0):
             start = (1.0, 0.0)
             _, _, v = adapter.line(masses, (0.0, 0.05 + 0.3 * dt), start, e, dt, 0.12)
-            off = float(np.abs(v[-1] - exact.line_velocities(masses, start, e)).max())
-            if off > worst:
-                worst, words = off, f"masses {masses[0]:g} : {masses[1]:g}, e = {e:g}"
-    remark = "" if worst <= OFF else f"velocities after a pair's impact are off by {worst:.2g} m/s ({words})"
+            error = float(np.abs(v[-1] - exact.line_velocities(masses, start, e)).max())
+            if error > worst:
+                worst, words = error, f"masses {masses[0]:g} : {masses[1]:g}, e = {e:g}"
+    remark = "" if worst <= REMARKED_ERROR else f"velocities after a pair's impact are off by {worst:.2g} m/s ({words})"
     return Measurement(
         "pairs", f"velocities after a pair's impact at 1 m/s are off by {worst:.1e} m/s at most", remark,
         {"largest_difference_m_s": worst},
@@ -399,20 +399,20 @@ def three_in_line(adapter: Adapter, dt: float) -> Measurement:
     """Three equal bodies, two of them a thousandth of a step's way apart: the last alone flies on, as in a cradle."""
     gap = 1e-3 * dt
     _, _, v = adapter.line((1.0, 1.0, 1.0), (0.0, 0.05, 0.05 + gap), (1.0, 0.0, 0.0), 1.0, dt, 0.12)
-    off = float(np.abs(v[-1] - (0.0, 0.0, 1.0)).max())
+    error = float(np.abs(v[-1] - (0.0, 0.0, 1.0)).max())
     shown = ", ".join(f"{u:.3f}" for u in v[-1])
-    remark = "" if off <= OFF else f"of a cradle of three all move on, with {shown} m/s (exact: 0, 0, 1)"
+    remark = "" if error <= REMARKED_ERROR else f"of a cradle of three all move on, with {shown} m/s (exact: 0, 0, 1)"
     return Measurement("three in line", f"a cradle of three ends with {shown} m/s", remark, {"velocities": list(v[-1])})
 
 
 def one_instant(adapter: Adapter, dt: float) -> Measurement:
     """Two bodies strike a third from both sides at one instant; the answer is its own mirror image."""
     _, _, v = adapter.line((1.0, 1.0, 1.0), (-0.05, 0.0, 0.05), (1.0, 0.0, -1.0), 1.0, dt, 0.12)
-    off = float(np.abs(v[-1] + v[-1][::-1]).max())
-    remark = "" if off <= 1e-6 else f"after two hits at one instant mirrored speeds differ by {off:.2g} m/s"
+    asymmetry = float(np.abs(v[-1] + v[-1][::-1]).max())
+    remark = "" if asymmetry <= 1e-6 else f"after two hits at one instant mirrored speeds differ by {asymmetry:.2g} m/s"
     return Measurement(
-        "one instant", f"two hits at one instant are mirror images of each other to {off:.1e} m/s", remark,
-        {"asymmetry_m_s": off},
+        "one instant", f"two hits at one instant are mirror images of each other to {asymmetry:.1e} m/s", remark,
+        {"asymmetry_m_s": asymmetry},
     )  # fmt: skip
 
 

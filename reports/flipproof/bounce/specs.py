@@ -107,10 +107,10 @@ def _kept(words: list[str]) -> Callable[[list[str]], str]:
     assert isinstance(program.stdin, io.RawIOBase)
     assert isinstance(program.stdout, io.RawIOBase)
     given, answers = program.stdin, io.TextIOWrapper(io.BufferedReader(program.stdout), errors="replace")
-    late = threading.Event()
+    timed_out = threading.Event()
 
     def stop() -> None:
-        late.set()
+        timed_out.set()
         end(program)
 
     def answer(numbers: list[str]) -> str:
@@ -126,7 +126,7 @@ def _kept(words: list[str]) -> Callable[[list[str]], str]:
         if line:
             return "".join(lines)
         last = "".join(lines[-1:]).strip()
-        if late.is_set():
+        if timed_out.is_set():
             raise AdapterError(
                 f"cmd: no answer that an empty line ends within {TIMEOUT:g} s, but {shortened(last, 60)!r}; "
                 "is the output flushed?"

@@ -92,16 +92,18 @@ def compare(first: Curve, second: Curve) -> Comparison:
 
 
 def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
-    (t, values), (times, others) = first.series[quantity], second.series[quantity]
+    (t, values), (times, other_values) = first.series[quantity], second.series[quantity]
     if times[0] > t[-1] or t[0] > times[-1]:
         raise ValueError(f"{first.label} and {second.label} have no common time")
     scale = float(values[0]) if quantity == "omega" else 1.0
     if scale == 0.0:
         raise ValueError(f"{first.label}: omega is 0 at the first time; differences are taken relative to it")
-    t, values, others, interpolated = beside(t, values, times, others)
+    t, values, other_values, interpolated = beside(t, values, times, other_values)
     if len(t) < 2:
         raise ValueError(f"{first.label} has {len(t)} times within those of {second.label}; at least 2 are needed")
-    return Apart(quantity=quantity, t=t, first=values, second=others, scale=scale, interpolated=int(interpolated.sum()))
+    return Apart(
+        quantity=quantity, t=t, first=values, second=other_values, scale=scale, interpolated=int(interpolated.sum())
+    )
 
 
 def table(both: Comparison) -> str:
@@ -136,10 +138,10 @@ def table(both: Comparison) -> str:
 def _times(both: Comparison) -> str:
     """Return at which times the two are compared, and how often one of them is interpolated."""
     counts = {(len(gap.t), gap.interpolated) for gap in both.apart}
-    most, interpolated = max(counts)
+    n, interpolated = max(counts)
     if not any(between for _, between in counts):
-        return f"compared at {most} times that both have; nothing is interpolated"
-    return f"compared at {most} times of {both.first}; {both.second} is interpolated linearly at {interpolated} of them"
+        return f"compared at {n} times that both have; nothing is interpolated"
+    return f"compared at {n} times of {both.first}; {both.second} is interpolated linearly at {interpolated} of them"
 
 
 def claims(comparison: Comparison, tolerance: float) -> tuple[Finding, ...]:

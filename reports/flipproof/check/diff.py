@@ -1,6 +1,6 @@
 """Two reports compared: which findings moved beyond their bands, changed their verdict, came or went.
 
-    |new - old| <= band_new + band_old + tolerance + ROUND_OFF max(|new|, |old|) + LEAST
+    |new - old| <= band_new + band_old + tolerance + ROUND_OFF max(|new|, |old|) + MIN_CHANGE
 
 A finding that moved further and states no band in either report is not comparable: a residual, a ratio of growth or a
 cost may be another on another machine, and nothing says by how much. It is told and not counted as a difference; its
@@ -24,7 +24,7 @@ from slicemodel.scenario import UnsuitableFileError, read_text
 ROUND_OFF: Final = 1e-9
 """Relative change of a number that nobody claims to be a change."""
 
-LEAST: Final = 1e-12
+MIN_CHANGE: Final = 1e-12
 """Absolute change, in the unit of the finding, that nobody claims to be a change."""
 
 TOLERANCE: Final = 1e-6
@@ -166,8 +166,8 @@ def compare_summaries(old: Mapping[str, Any], new: Mapping[str, Any], tolerance:
     after = {finding["id"]: finding for finding in new["findings"]}
     both = [name for name in before if name in after]
     changes = [change for name in both if (change := change_of(before[name], after[name], tolerance)) is not None]
-    changes += [Change(kind="gone", id=n, words=_said(f)) for n, f in before.items() if n not in after]
-    changes += [Change(kind="new", id=n, words=_said(f)) for n, f in after.items() if n not in before]
+    changes += [Change(kind="gone", id=n, words=_finding_words(f)) for n, f in before.items() if n not in after]
+    changes += [Change(kind="new", id=n, words=_finding_words(f)) for n, f in after.items() if n not in before]
     return Comparison(
         premises=tuple(_premises(old, new)),
         circumstances=tuple(_circumstances(old, new)),
@@ -209,7 +209,7 @@ def within(old: float, new: float, allowed: float) -> bool:
     """Return whether two numbers are the same within ``allowed`` and round-off; NaN is the same as NaN."""
     if not (math.isfinite(old) and math.isfinite(new)):
         return old == new or (math.isnan(old) and math.isnan(new))
-    return abs(new - old) <= allowed + ROUND_OFF * max(abs(old), abs(new)) + LEAST
+    return abs(new - old) <= allowed + ROUND_OFF * max(abs(old), abs(new)) + MIN_CHANGE
 
 
 def _moved(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
@@ -223,7 +223,7 @@ def _value(finding: Mapping[str, Any]) -> str:
     return "–" if value is None else f"{value:.6g} {finding['unit']}".strip()
 
 
-def _said(finding: Mapping[str, Any]) -> str:
+def _finding_words(finding: Mapping[str, Any]) -> str:
     return f"{finding['title']} ({_value(finding)}, {finding['verdict']})"
 
 

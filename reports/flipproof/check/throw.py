@@ -24,7 +24,7 @@ from typing import Any, Final
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named, parts
 from flipproof.chapters.solvers import Guest, invited
-from flipproof.check.diff import LEAST, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
+from flipproof.check.diff import MIN_CHANGE, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
 from flipproof.frame.findings import Finding, interval_text
 from flipproof.frame.gather import evaluate, gather
 from flipproof.frame.pool import SerialExecutor
@@ -97,8 +97,8 @@ def check(
     tasks: list[tuple[str, tuple[Guest, ...]]] = [(group, ()) for group in groups]
     tasks += [("guests", invited(guests, timeout))] if guests else []
     began = time.perf_counter()
-    for group, others in tasks:
-        for finding in findings_of(group, throw, store, others):
+    for group, invited_guests in tasks:
+        for finding in findings_of(group, throw, store, invited_guests):
             began, seconds[finding.id] = time.perf_counter(), time.perf_counter() - began
             was = old_findings.get(finding.id)
             moves = group == "thresholds" or (group == "guests" and finding.kind != "regression")
@@ -144,7 +144,7 @@ def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, move
     needs = [_threshold((low, high), finding.value)] if chosen else []
     value = number(was["value"])
     if moves and value is not None and math.isfinite(value):
-        allowed = 2.0 * bands(was) + tolerance + ROUND_OFF * abs(value) + LEAST
+        allowed = 2.0 * bands(was) + tolerance + ROUND_OFF * abs(value) + MIN_CHANGE
         low, high = max(low, value - allowed), min(high, value + allowed)
         needs.insert(0, f"baseline {value:.6g} ± {allowed:.1g}")
     return replace(finding, kind="regression", admissible=(low, high)), " and ".join(needs) or "any number"

@@ -57,7 +57,7 @@ def store_of(options: argparse.Namespace) -> RunStore:
     return RunStore(place, say=lambda words: print(f"flipproof: {words}", file=sys.stderr, flush=True))
 
 
-def add_guests(command: argparse.ArgumentParser, what: str) -> None:
+def add_guests(command: argparse.ArgumentParser, purpose: str) -> None:
     """Add ``--with SPEC``, which may be repeated, and ``--timeout``."""
     command.add_argument(
         "--with",
@@ -65,7 +65,7 @@ def add_guests(command: argparse.ArgumentParser, what: str) -> None:
         action="append",
         default=[],
         metavar="SPEC",
-        help=f"{what}, such as mine.py:solve; may be repeated",
+        help=f"{purpose}, such as mine.py:solve; may be repeated",
     )
     command.add_argument("--timeout", type=count, metavar="S", help="seconds one run of a --with solver may take")
 
@@ -134,9 +134,9 @@ def check_outputs(options: argparse.Namespace, *names: str) -> None:
         if path and not path.parent.is_dir():
             raise ValueError(f"--{name} {path}: the folder {path.parent} does not exist")
         if path and (path.is_file() or not path.exists()):
-            other = taken.setdefault(path.resolve(), name)
-            if other != name:
-                raise ValueError(f"--{name} {path} is the file of --{other}, too; name another")
+            first_name = taken.setdefault(path.resolve(), name)
+            if first_name != name:
+                raise ValueError(f"--{name} {path} is the file of --{first_name}, too; name another")
 
 
 def refuse_overwriting(options: argparse.Namespace, command: argparse.ArgumentParser) -> None:
@@ -166,9 +166,9 @@ def _read_by(texts: Sequence[str]) -> Iterator[Path]:
                         yield from file.parent.glob("*.py")
 
 
-def add_json(command: argparse.ArgumentParser, what: str) -> None:
+def add_json(command: argparse.ArgumentParser, content: str) -> None:
     """Add ``--json FILE``."""
-    command.add_argument("--json", type=output, metavar="FILE", help=f"write {what} as JSON, too")
+    command.add_argument("--json", type=output, metavar="FILE", help=f"write {content} as JSON, too")
 
 
 def write_json(path: Path | None, mapping: Mapping[str, Any]) -> None:

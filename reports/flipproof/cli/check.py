@@ -89,9 +89,9 @@ def command_check(options: argparse.Namespace) -> int:
     check_guests(options.guests)
     for spec in options.guests:
         check_asked(spec)
-    from flipproof.check.throw import groups as known
+    from flipproof.check.throw import groups as known_groups
 
-    groups = options.only or tuple(group for group in known() if options.baseline or group != "thresholds")
+    groups = options.only or tuple(group for group in known_groups() if options.baseline or group != "thresholds")
     if "thresholds" in groups and options.baseline is None:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
     check_outputs(options, "junit", "json")
@@ -193,10 +193,10 @@ def _compare_curves(options: argparse.Namespace) -> int:
     if options.plot and options.plot.suffix not in (".png", ".svg"):
         raise ValueError(f"--plot {options.plot} ends neither in .png nor in .svg")
     first, second = (read(name, options.columns) for name in (options.first, options.second))
-    twins, others = ([read(path, options.columns) for path in paths] for paths in (options.twin, options.twin_of_b))
+    twins, twins_of_b = ([read(path, options.columns) for path in paths] for paths in (options.twin, options.twin_of_b))
     allowed = None if options.from_twins else TOLERANCE if options.tolerance is None else options.tolerance
     comparison = compare(
-        first, second, twins=twins, twins_of_second=others, columns=options.columns, tolerance=allowed,
+        first, second, twins=twins, twins_of_second=twins_of_b, columns=options.columns, tolerance=allowed,
         shift=options.shift,
     )  # fmt: skip
     write_json(options.json, comparison.to_mapping())

@@ -26,8 +26,8 @@ def readable(words: str) -> str:
     return inert(_cut(" ".join(_cut(word, 300) for word in words.split()), 2000))
 
 
-def _cut(text: str, most: int) -> str:
-    return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 2 :]}"
+def _cut(text: str, max_length: int) -> str:
+    return text if len(text) <= max_length else f"{text[: max_length // 2]}...{text[-max_length // 2 :]}"
 
 
 def speak_plainly() -> None:

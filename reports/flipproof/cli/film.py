@@ -105,39 +105,39 @@ def command_film(options: argparse.Namespace) -> int:
     from flipproof.film import page
     from flipproof.film.judge import Judged, UnsoundError, compared, ranked, together
 
-    each = options.kind == "fit" and options.each
-    if each and len(options.model) > 1:
+    each_film = options.kind == "fit" and options.each
+    if each_film and len(options.model) > 1:
         raise ValueError("--each fits one equation to several films; name one --model")
     scenario = read_scenario(options.scenario)
-    groups = [(path,) for path in options.files] if each else [tuple(options.files)]
+    groups = [(path,) for path in options.files] if each_film else [tuple(options.files)]
     films: list[list[Judged]] = []
     for paths in groups:
-        judged = ranked([Judged(_estimate(options, paths, scenario, name)) for name in options.model])
+        judgements = ranked([Judged(_estimate(options, paths, scenario, name)) for name in options.model])
         try:
-            judged[0].check()
+            judgements[0].check()
         except UnsoundError as error:
             print(f"flipproof: {error}", file=sys.stderr)
             return 1
-        films.append(judged)
+        films.append(judgements)
     lines: list[str] = []
-    for judged in films:
-        film = judged[0].estimate.film
+    for judgements in films:
+        film = judgements[0].estimate.film
         lines += [f"{film.label}: {len(film.t)} frames ({'; '.join(film.notes)})"]
-        for judgement in judged:
+        for judgement in judgements:
             lines += judgement.lines()
-        lines += [compared(judged), ""]
-    if each:
-        lines += _shared(*together([judged[0] for judged in films]))
+        lines += [compared(judgements), ""]
+    if each_film:
+        lines += _shared(*together([judgements[0] for judgements in films]))
     text = "\n".join(lines).rstrip()
     print(text)
     if options.out is not None:
         facts: Mapping[str, str] = provenance(command_line())
         with replaced_folder(options.out, options.kind) as folder:
-            for k, judged in enumerate(films):
-                place = folder / f"film-{k + 1}" if each else folder
+            for k, judgements in enumerate(films):
+                place = folder / f"film-{k + 1}" if each_film else folder
                 place.mkdir(exist_ok=True)
-                page.write(judged, text, place, facts)
-        print(f"written  {options.out / ('film-1/index.html' if each else 'index.html')}")
+                page.write(judgements, text, place, facts)
+        print(f"written  {options.out / ('film-1/index.html' if each_film else 'index.html')}")
     return 0
 
 
@@ -162,12 +162,12 @@ def _estimate(options: argparse.Namespace, paths: tuple[Path, ...], scenario: An
 
 
 def _counter(step: Callable[..., None]) -> Callable[[int], object]:
-    made = 0
+    n_flights = 0
 
     def tick(flights: int) -> None:
-        nonlocal made
-        made += flights
-        step(made, None)
+        nonlocal n_flights
+        n_flights += flights
+        step(n_flights, None)
 
     return tick
 

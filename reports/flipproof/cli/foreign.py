@@ -72,14 +72,14 @@ def command_models(options: argparse.Namespace) -> int:
     from flipproof.foreign.specs import offered
     from flipproof.frame.solvers import catalogue
 
-    own, points = catalogue(), sorted(offered().items())
+    built_in, points = catalogue(), sorted(offered().items())
     if options.json:
-        solvers = {name: asdict(solver) for name, solver in own.items()}
-        others = {n: {"object": p.value, "distribution": p.dist.name if p.dist else None} for n, p in points}
-        print(json.dumps({"solvers": solvers, "offered": others}, indent=1, ensure_ascii=False))
+        solvers = {name: asdict(solver) for name, solver in built_in.items()}
+        external = {n: {"object": p.value, "distribution": p.dist.name if p.dist else None} for n, p in points}
+        print(json.dumps({"solvers": solvers, "offered": external}, indent=1, ensure_ascii=False))
         return 0
     package = ""
-    for solver in own.values():
+    for solver in built_in.values():
         if solver.package != package:
             package = solver.package
             print(f"\n{package}.solve(scenario, {solver.keyword}=...)\n")

@@ -124,10 +124,10 @@ class ReportProgress:
             sys.stderr.write(f"flipproof: {time.monotonic() - self._began:.0f} s: {stage}\n")
             sys.stderr.flush()
 
-    def show(self, made: int, planned: int, label: str = "") -> None:
+    def show(self, n_done: int, planned: int, label: str = "") -> None:
         """Take over how much of the stage is done."""
         if self._line:
-            part = self._costs.get(self._stage, 0.0) * made / max(planned, 1)
+            part = self._costs.get(self._stage, 0.0) * n_done / max(planned, 1)
             whole = sum(self._costs.values()) or 1.0
             self._line.show((self._done + part) / whole, f"{self._stage}: {label}" if label else self._stage)
 

@@ -46,8 +46,8 @@ def commands_of(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentPars
 
 def second_screen(commands: Mapping[str, argparse.ArgumentParser]) -> str:
     """Return the commands that the first screen leaves out, and what exit statuses mean."""
-    others = [name for name in commands if name not in (*FIRST, "more")]
-    return f"{_listed(others, commands)}\n\n{EXIT_STATUSES}"
+    remaining = [name for name in commands if name not in (*FIRST, "more")]
+    return f"{_listed(remaining, commands)}\n\n{EXIT_STATUSES}"
 
 
 def _listed(names: Iterable[str], commands: Mapping[str, argparse.ArgumentParser]) -> str:

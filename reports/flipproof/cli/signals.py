@@ -81,10 +81,10 @@ def _importing(frame: FrameType | None) -> bool:
     return False
 
 
-def _unraisable(what: sys.UnraisableHookArgs) -> None:
+def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
     """Interrupt again if the interrupt came where Python drops exceptions, such as a finalizer."""
-    if isinstance(what.exc_value, KeyboardInterrupt):
+    if isinstance(unraisable.exc_value, KeyboardInterrupt):
         signal.signal(signal.SIGINT, _interrupt)
         _interrupt_again(signal.SIGINT)
     else:
-        sys.__unraisablehook__(what)
+        sys.__unraisablehook__(unraisable)

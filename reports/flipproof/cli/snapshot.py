@@ -80,8 +80,8 @@ def write_front_page(summary: Mapping[str, Any], readme: Path) -> None:
         text = readme.read_text(encoding="utf-8")
     except OSError as error:
         raise ValueError(f"{readme}: cannot be read ({error})") from error
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
+    before, begin, remainder = text.partition(BEGIN)
+    _, end, after = remainder.partition(END)
     if not begin or not end:
         raise ValueError(f"{readme}: has no {BEGIN} … {END}")
     readme.write_text(before + begin + "\n" + front_page(summary) + end + after, encoding="utf-8")

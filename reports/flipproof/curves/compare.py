@@ -38,7 +38,7 @@ TOLERANCE: Final = 1e-3
 
 
 def beside(
-    t: FloatArray, values: FloatArray, times: FloatArray, others: FloatArray
+    t: FloatArray, values: FloatArray, times: FloatArray, other_values: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return common times, the first curve's values, the second's at these, and which are interpolated, (K,) each.
 
@@ -49,10 +49,10 @@ def beside(
     t, values, after = t[kept], values[kept], ends[kept]
     near = 1e-12 * max(abs(times[0]), abs(times[-1]))  # printing and reading a time explains so much
     before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
-    own = before <= behind
-    resampled = np.where(after, others[behind], others[np.minimum(before, len(times) - 1)])
-    resampled[~own] = np.interp(t[~own], times, others)
-    return t, values, resampled, ~own
+    coincident = before <= behind
+    resampled = np.where(after, other_values[behind], other_values[np.minimum(before, len(times) - 1)])
+    resampled[~coincident] = np.interp(t[~coincident], times, other_values)
+    return t, values, resampled, ~coincident
 
 
 def interpolation_error(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
@@ -83,20 +83,20 @@ class Gap:
     matched: Matched
 
 
-def gap(first: Curves, second: Curves, column: str, *, shift: float, least: float) -> Gap:
-    """Return how far two curves are apart in a column; a jump is larger than ``least`` and may be ``shift`` early.
+def gap(first: Curves, second: Curves, column: str, *, shift: float, min_jump: float) -> Gap:
+    """Return how far two curves are apart in a column; a jump is larger than ``min_jump`` and may be ``shift`` early.
 
     Raises ValueError if they share fewer than 2 times.
     """
-    values, others = first.columns[column], second.columns[column]
-    t, mine, its, interpolated = beside(first.t, values, second.t, others)
+    values, other_values = first.columns[column], second.columns[column]
+    t, left, right, interpolated = beside(first.t, values, second.t, other_values)
     if len(t) < 2:
         raise ValueError(
             f"{first.label} ({first.t[0]:g} to {first.t[-1]:g}) has {len(t)} times within those of {second.label} "
             f"({second.t[0]:g} to {second.t[-1]:g}); at least 2 are needed"
         )
-    size = np.abs(its - mine)
-    of_first, of_second = jumps(first.t, values, least), jumps(second.t, others, least)
+    size = np.abs(right - left)
+    of_first, of_second = jumps(first.t, values, min_jump), jumps(second.t, other_values, min_jump)
     matched = match(
         of_first.time[of_first.time <= t[-1]], of_second.time[of_second.time <= t[-1]], shift + of_first.step
     )
@@ -104,10 +104,10 @@ def gap(first: Curves, second: Curves, column: str, *, shift: float, least: floa
     for t_first, t_second in matched.pairs:
         around = (t >= min(t_first, t_second) - reach) & (t <= max(t_first, t_second) + reach)
         lower, upper = tube_around(first.t, values, t[around], abs(t_second - t_first) + reach, 0.0)
-        size[around] = np.maximum(0.0, np.maximum(its[around] - upper, lower - its[around]))
-    error = np.where(interpolated, interpolation_error(second.t, others, t), 0.0)
+        size[around] = np.maximum(0.0, np.maximum(right[around] - upper, lower - right[around]))
+    error = np.where(interpolated, interpolation_error(second.t, other_values, t), 0.0)
     return Gap(
-        t=t, first=mine, second=its, size=size, error=error, interpolated=int(interpolated.sum()), matched=matched
+        t=t, first=left, second=right, size=size, error=error, interpolated=int(interpolated.sum()), matched=matched
     )
 
 
@@ -311,16 +311,16 @@ def compare(
 
 
 def _column(
-    name: str, first: Curves, second: Curves, twins: Sequence[Curves], others: Sequence[Curves], tolerance: float,
+    name: str, first: Curves, second: Curves, twins: Sequence[Curves], second_twins: Sequence[Curves], tolerance: float,
     shift: float,
 ) -> Column:  # fmt: skip
-    least = tolerance or TOLERANCE * float(np.ptp(first.columns[name]))
+    min_jump = tolerance or TOLERANCE * float(np.ptp(first.columns[name]))
     changes = []
-    for run, doubles in ((first, twins), (second, others)):
-        gaps = [gap(run, twin, name, shift=np.inf, least=least) for twin in doubles]
+    for run, doubles in ((first, twins), (second, second_twins)):
+        gaps = [gap(run, twin, name, shift=np.inf, min_jump=min_jump) for twin in doubles]
         changes.append(gaps)
         shift += SAFETY * max((float(np.abs(g.matched.shift).max(initial=0.0)) for g in gaps), default=0.0)
-    between = gap(first, second, name, shift=shift, least=least)
+    between = gap(first, second, name, shift=shift, min_jump=min_jump)
     change = sum((_widest(gaps, between.t) for gaps in changes), np.zeros(len(between.t)))
     band = SAFETY * np.maximum.accumulate(change)
     comparable = np.ones(len(band), bool) if not tolerance else band <= 0.5 * tolerance
@@ -328,7 +328,7 @@ def _column(
     if tolerance:
         comparable = comparable & (between.error <= 0.5 * tolerance)
     seen = np.flatnonzero(change > 0.0)
-    crossing = first_crossing(between.t, np.where(np.isfinite(change), change, np.finfo(float).max), least)
+    crossing = first_crossing(between.t, np.where(np.isfinite(change), change, np.finfo(float).max), min_jump)
     stop = math.inf if crossing is None else crossing
     growth = fit_growth(between.t, change, stop=stop) if len(seen) else Growth()
     last_digit = None
@@ -336,7 +336,7 @@ def _column(
         started = changes[0][0].size[0]
         value = abs(float(first.columns[name][0]))
         last = float(np.spacing(value))
-        if value > 0.0 and last < started < least:
+        if value > 0.0 and last < started < min_jump:
             last_digit = crossing + (math.log(started) - math.log(last)) / growth.rate
     return Column(
         name=name,

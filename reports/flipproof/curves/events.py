@@ -18,24 +18,24 @@ MAX_EVENTS: Final = 2000
 """Events of a run that are matched."""
 
 
-def closest(first: FloatArray, second: FloatArray, mine: IndexArray, its: IndexArray) -> IndexArray:
+def closest(first: FloatArray, second: FloatArray, in_first: IndexArray, in_second: IndexArray) -> IndexArray:
     """Match as many as possible in order, with the smallest sum of shifts; return indices, shape (2, K)."""
-    if len(mine) > len(its):
-        return closest(second, first, its, mine)[::-1]
-    shift = np.abs(second[its][np.newaxis, :] - first[mine][:, np.newaxis])
-    # best[i, j]: smallest sum for the first i of mine among the first j of its
-    best = np.full((len(mine) + 1, len(its) + 1), np.inf)
+    if len(in_first) > len(in_second):
+        return closest(second, first, in_second, in_first)[::-1]
+    shift = np.abs(second[in_second][np.newaxis, :] - first[in_first][:, np.newaxis])
+    # best[i, j]: smallest sum for the first i of in_first among the first j of in_second
+    best = np.full((len(in_first) + 1, len(in_second) + 1), np.inf)
     best[0] = 0.0
-    for i in range(len(mine)):
+    for i in range(len(in_first)):
         best[i + 1, 1:] = np.minimum.accumulate(best[i, :-1] + shift[i])
     chosen = []
-    j = len(its)
-    for i in range(len(mine), 0, -1):
+    j = len(in_second)
+    for i in range(len(in_first), 0, -1):
         while best[i, j - 1] <= best[i, j]:
             j -= 1
         j -= 1
         chosen.append(j)
-    return np.stack([mine, its[chosen[::-1]]])
+    return np.stack([in_first, in_second[chosen[::-1]]])
 
 
 class Jumps(NamedTuple):
@@ -45,17 +45,17 @@ class Jumps(NamedTuple):
     step: float
 
 
-def jumps(t: FloatArray, values: FloatArray, least: float) -> Jumps:
+def jumps(t: FloatArray, values: FloatArray, min_jump: float) -> Jumps:
     """Return where a column jumps: twice given at one time, or changing ``RATIO`` times as fast as its neighbours do.
 
-    Smaller changes than ``least`` are no jumps; nor is a peak of one row, which is two changes beside each other.
+    Smaller changes than ``min_jump`` are no jumps; nor is a peak of one row, which is two changes beside each other.
     """
     h, change = np.diff(t), np.abs(np.diff(values))
     usual = float(np.median(h[h > 0.0])) if (h > 0.0).any() else 0.0
     rate = np.divide(change, h, out=np.zeros_like(h), where=h > 0.0)
     padded = np.pad(rate, 2)
     beside = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)
-    mask = (change > least) & ((h == 0.0) | ((rate > RATIO * beside) & (h > 0.0)))
+    mask = (change > min_jump) & ((h == 0.0) | ((rate > RATIO * beside) & (h > 0.0)))
     return Jumps((t[:-1][mask] + t[1:][mask]) / 2.0, usual)
 
 

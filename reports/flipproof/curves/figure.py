@@ -9,9 +9,9 @@ from flipproof.figures.style import Drawing, draw, new_figure, styled
 
 
 @styled
-def picture(found: Comparison) -> Drawing:
+def picture(comparison: Comparison) -> Drawing:
     """Return the picture, a row for each of the first eight columns."""
-    shown = found.columns[:8]
+    shown = comparison.columns[:8]
     figure, rows = new_figure(len(shown), 1, size=(8.0, 1.0 + 2.2 * len(shown)), squeeze=False, sharex=True)
     for column, axes in zip(shown, rows[:, 0], strict=True):
         size, allowed = (np.where(values > 0.0, values, np.nan) for values in (column.gap.size, column.allowed))

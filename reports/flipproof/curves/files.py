@@ -106,8 +106,8 @@ def _number(label: str, name: str, row: int, value: Any) -> float:
     try:
         return float(value)
     except (TypeError, ValueError):
-        what = "is empty" if not str(value).strip() else f"{shortened(repr(str(value)), 40)} is not a number"
-        raise ValueError(f"{label}: row {row}, column {name!r}: {what}") from None
+        problem = "is empty" if not str(value).strip() else f"{shortened(repr(str(value)), 40)} is not a number"
+        raise ValueError(f"{label}: row {row}, column {name!r}: {problem}") from None
 
 
 def read(path: Path | str, columns: Sequence[str] | None = None, time: str | None = None) -> Curves:

@@ -42,16 +42,16 @@ def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: 
     all pairs of them (Theil and Sen). Its standard error is that of a straight line whose scatter is the median
     absolute residual, scaled to a normal distribution. Points below round-off or not finite are left out.
     """
-    windows, least = 12, 4
+    windows, min_points = 12, 4
     size = np.abs(size)
     usable = (t >= start) & (t <= stop) & np.isfinite(size) & (size > 1e-14)
     times, logs = t[usable], np.log(size[usable])
-    if len(times) < least:
+    if len(times) < min_points:
         return Growth()
     edges = np.linspace(times[0], times[-1], windows + 1)
     window = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, windows - 1)
     filled = np.unique(window)
-    if len(filled) < least:
+    if len(filled) < min_points:
         return Growth()
     x = np.array([times[window == w].mean() for w in filled])
     y = np.array([np.median(logs[window == w]) for w in filled])

@@ -31,15 +31,15 @@ class Held(NamedTuple):
     largest: float
 
 
-def hold(times: FloatArray, values: FloatArray, at: FloatArray, other: FloatArray, *, dt: float, dy: float) -> Held:
-    """Hold a curve (``at``, ``other``) against the tube around (``times``, ``values``), both linear between points.
+def hold(times: FloatArray, values: FloatArray, at: FloatArray, curve: FloatArray, *, dt: float, dy: float) -> Held:
+    """Hold a curve (``at``, ``curve``) against the tube around (``times``, ``values``), both linear between points.
 
     ``dt`` and ``dy`` are not negative; where the curve does not exist it is outside.
     """
     marks = np.concatenate([times, at, times - dt, times + dt])
     t = np.unique(marks[(marks >= times[0]) & (marks <= times[-1])])
     lower, upper = tube_around(times, values, t, dt, dy)
-    value = np.interp(t, at, other, left=math.nan, right=math.nan)
+    value = np.interp(t, at, curve, left=math.nan, right=math.nan)
     outside = np.maximum(value - upper, lower - value)
     outside[np.isnan(outside)] = np.inf  # where the run does not exist
     inside = outside <= 0.0

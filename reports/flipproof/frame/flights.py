@@ -46,8 +46,8 @@ class Outcome(Generic[T]):
 class Flights(dict[Run, RunResult]):
     """What became of runs and calls, by the run or call itself. ``flights[run]`` raises Missing if it was not made."""
 
-    def __init__(self, made: Mapping[Run, RunResult], called: Mapping[Call, Outcome[Any]] | None = None) -> None:
-        super().__init__(made)
+    def __init__(self, results: Mapping[Run, RunResult], called: Mapping[Call, Outcome[Any]] | None = None) -> None:
+        super().__init__(results)
         self._called = dict(called or {})
 
     def __missing__(self, run: Run) -> RunResult:
@@ -69,9 +69,9 @@ class Flights(dict[Run, RunResult]):
         """Return the flights of levels of runs; raises Missing if one was not made."""
         return [[self[run].flight for run in level] for level in runs]
 
-    def add(self, made: Mapping[Run, RunResult], called: Mapping[Call, Outcome[Any]]) -> None:
+    def add(self, results: Mapping[Run, RunResult], called: Mapping[Call, Outcome[Any]]) -> None:
         """Add what became of another wave."""
-        self.update(made)
+        self.update(results)
         self._called.update(called)
 
 

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-OWN: Final = ("slicemodel", "ode_reference", "engine_check", "flipproof")
+PACKABLE: Final = ("slicemodel", "ode_reference", "engine_check", "flipproof")
 """Packages whose data classes can be packed."""
 
 TREE: Final = "value.json"
@@ -82,9 +82,9 @@ def _plain(value: Any, arrays: Arrays) -> Any:
     if isinstance(value, Mapping):
         return ["dict", [[_plain(key, arrays), _plain(element, arrays)] for key, element in value.items()]]
     cls = type(value)
-    if _is_named_tuple(cls) and cls.__module__.partition(".")[0] in OWN:
+    if _is_named_tuple(cls) and cls.__module__.partition(".")[0] in PACKABLE:
         return ["data", f"{cls.__module__}:{cls.__qualname__}", _plain(value._asdict(), arrays)[1]]
-    if is_dataclass(cls) and cls.__module__.partition(".")[0] in OWN:
+    if is_dataclass(cls) and cls.__module__.partition(".")[0] in PACKABLE:
         given = [[field.name, _plain(getattr(value, field.name), arrays)] for field in fields(cls) if field.init]
         return ["data", f"{cls.__module__}:{cls.__qualname__}", given]
     raise TypeError(f"{cls.__module__}.{cls.__qualname__} cannot be packed")
@@ -94,22 +94,22 @@ def _value(tree: Any, stacks: Sequence[NDArray[Any]]) -> Any:
     """Return what ``_plain`` made a tree of."""
     if not isinstance(tree, list):
         return tree
-    kind, content, *rest = tree
+    kind, content, *extra = tree
     if kind in ("list", "tuple"):
         values = [_value(element, stacks) for element in content]
         return tuple(values) if kind == "tuple" else values
     if kind == "dict":
         return {_value(key, stacks): _value(element, stacks) for key, element in content}
     if kind == "data":
-        return _class_of(content)(**{name: _value(element, stacks) for name, element in rest[0]})
-    part = stacks[content][rest[0]]
+        return _class_of(content)(**{name: _value(element, stacks) for name, element in extra[0]})
+    part = stacks[content][extra[0]]
     return part.tobytes() if kind == "bytes" else part if kind == "scalar" else np.asarray(part)
 
 
 def _class_of(name: str) -> type[Any]:
     """Return a data class or named tuple of this program by "module:name"; a TypeError refuses everything else."""
     module, _, inner = name.partition(":")
-    kind: Any = getattr(import_module(module), inner, None) if module.partition(".")[0] in OWN else None
+    kind: Any = getattr(import_module(module), inner, None) if module.partition(".")[0] in PACKABLE else None
     if not (isinstance(kind, type) and (is_dataclass(kind) or _is_named_tuple(kind)) and kind.__module__ == module):
         raise TypeError(f"{name} is no data class of this program")
     return kind

@@ -21,7 +21,7 @@ COSTS: Final = {"certificate": 4000, "witness": 100, "engine": 50, "call": 20, "
 by an engine, any other run.
 """
 
-FEW: Final = 20
+SHORT_RUN_SLICES: Final = 20
 """Slices with which an engine's run is not long."""
 
 GROUP = 8
@@ -53,11 +53,11 @@ def make_all(
     costs = {run: COSTS[_kind(run)] for job in jobs for run in job}
     planned, done = sum(costs.values()) + COSTS["call"] * len(pending_calls), 0
 
-    def tell(label: str) -> None:
+    def report(label: str) -> None:
         progress(done + COSTS["call"] * sum(answer.done() for answer in pending_calls.values()), planned, label)
 
     def answered(label: str) -> Callable[[Future[Any]], None]:
-        return lambda _: tell(label)
+        return lambda _: report(label)
 
     for call, answer in pending_calls.items():
         answer.add_done_callback(answered(call.label))
@@ -78,7 +78,7 @@ def make_all(
                 store.keep(result)
                 finished[result.run] = result
                 done += costs[result.run]
-                tell(result.run.name)
+                report(result.run.name)
     called: dict[Call, Outcome[Any]] = {}
     for call, answer in pending_calls.items():
         try:
@@ -117,7 +117,7 @@ def _kind(run: Run) -> str:
         return "quick"
     if "tolerance" in run.settings:
         return "certificate"
-    return "engine" if run.scenario.n_slices > FEW else "slow"
+    return "engine" if run.scenario.n_slices > SHORT_RUN_SLICES else "slow"
 
 
 def make_each(runs: Iterable[Run]) -> list[RunResult]:

@@ -70,8 +70,8 @@ class RunStore(AbstractContextManager["RunStore"]):
     ) -> None:
         self.place, self.slow, self.limit, self._say = place, slow, limit, say
         self.asked, self.calls = 0, 0
-        self.found: list[str] = []
-        self.found_calls: list[str] = []
+        self.run_hits: list[str] = []
+        self.call_hits: list[str] = []
         self._lock = threading.RLock()
         self._store: Store | None = None
         self._added = 0
@@ -101,17 +101,17 @@ class RunStore(AbstractContextManager["RunStore"]):
     def find(self, run: Run) -> RunResult | None:
         """Return the run as it was kept; None if it was not, or not by this code, or what was kept is damaged."""
         self.asked += 1
-        kept = self._get(key_of(run), self.found) if self._store is not None else None
+        kept = self._get(key_of(run), self.run_hits) if self._store is not None else None
         if kept is None:
             return None
         trajectory, seconds = kept[0]
         return RunResult(run, trajectory, seconds) if isinstance(trajectory, Trajectory) else None
 
-    def keep(self, made: RunResult) -> None:
+    def keep(self, result: RunResult) -> None:
         """Keep a run that was slow and ended in a trajectory."""
-        if self._store is not None and made.trajectory is not None and made.seconds >= self.slow:
-            run = made.run
-            content = packed((made.trajectory, made.seconds), made.seconds, self.slow)
+        if self._store is not None and result.trajectory is not None and result.seconds >= self.slow:
+            run = result.run
+            content = packed((result.trajectory, result.seconds), result.seconds, self.slow)
             self._put(key_of(run), {"solver": run.solver}, run.scenario.to_mapping(), content)
 
     def remembering(self, pool: Executor) -> Executor:
@@ -121,7 +121,7 @@ class RunStore(AbstractContextManager["RunStore"]):
     def find_call(self, key: bytes | None) -> tuple[Any] | None:
         """Return the answer of a call as it was kept, alone in a tuple, or None."""
         self.calls += 1
-        return self._get(key, self.found_calls)
+        return self._get(key, self.call_hits)
 
     def keep_call(self, key: bytes | None, name: str, content: bytes | None) -> None:
         """Keep the packed answer of a call by the name of its function."""
@@ -129,11 +129,11 @@ class RunStore(AbstractContextManager["RunStore"]):
 
     def facts(self) -> dict[str, str]:
         """Return how much of what was asked for came from the store and when it was made, for the provenance."""
-        if self._store is None and not self.found + self.found_calls:
+        if self._store is None and not self.run_hits + self.call_hits:
             return {WORDS: f"none: {self._problem}"}
-        runs = f"{len(self.found)} of {self.asked} runs"
-        calls = f"{len(self.found_calls)} of {self.calls} maps and audits" if self.calls else ""
-        when = sorted(self.found + self.found_calls)
+        runs = f"{len(self.run_hits)} of {self.asked} runs"
+        calls = f"{len(self.call_hits)} of {self.calls} maps and audits" if self.calls else ""
+        when = sorted(self.run_hits + self.call_hits)
         dates = f"made {when[0]} UTC" + (f" to {when[-1]} UTC" if when[-1] != when[0] else "") if when else ""
         return {WORDS: ", ".join(part for part in (runs, calls, dates) if part)}
 
@@ -225,8 +225,8 @@ class RunStore(AbstractContextManager["RunStore"]):
             for end in ("", "-wal", "-shm"):
                 self.place.with_name(self.place.name + end).unlink(missing_ok=True)
             self._open(None)
-        except UNUSABLE as other:
-            self._problem = f"{self.place} cannot be used ({other})"
+        except UNUSABLE as second_error:
+            self._problem = f"{self.place} cannot be used ({second_error})"
 
 
 def packed(value: object, seconds: float, slow: float) -> bytes | None:

@@ -18,11 +18,11 @@ Value = TypeVar("Value", float, FloatArray)
 
 def sets_before(name: str, names: Collection[str]) -> Iterator[tuple[tuple[str, ...], float]]:
     """Yield every set of other ``names`` with the share of all orders in which just these come before ``name``."""
-    others = [other for other in names if other != name]
+    remaining = [candidate for candidate in names if candidate != name]
     n = len(names)
     for size in range(n):
         weight = math.factorial(size) * math.factorial(n - size - 1) / math.factorial(n)
-        for chosen in combinations(others, size):
+        for chosen in combinations(remaining, size):
             yield chosen, weight
 
 

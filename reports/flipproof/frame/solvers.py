@@ -63,8 +63,8 @@ def find(name: str) -> Solver:
     solvers = catalogue()
     if name not in solvers:
         for module in OTHERS:
-            if (others := import_module(module)).is_spec(name):
-                others.check_spec(name)
+            if (provider := import_module(module)).is_spec(name):
+                provider.check_spec(name)
                 return Solver(name, module, "spec", "", "somebody else's solver")
         raise ValueError(unknown_name("solver", name, solvers))
     return solvers[name]

@@ -265,9 +265,9 @@ def _connect(path: Path, through: bool = False) -> sqlite3.Connection:
         tables = {(name.decode(), sql.decode()) for name, sql in schema_rows}
         ((application,),) = rows.execute("PRAGMA application_id").fetchall()
         ((schema,),) = rows.execute("PRAGMA user_version").fetchall()
-        own = (application, schema) == (APPLICATION, SCHEMA), tables == OBJECTS
-        if tables and own != (True, True):
-            if any(own):
+        matches = (application, schema) == (APPLICATION, SCHEMA), tables == OBJECTS
+        if tables and matches != (True, True):
+            if any(matches):
                 raise _damage("its schema is not that of a store")
             error = sqlite3.DatabaseError("it is a database of something else or of another version of flipproof")
             error.sqlite_errorcode = sqlite3.SQLITE_MISUSE

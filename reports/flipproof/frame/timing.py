@@ -81,8 +81,8 @@ def _short(run: Run) -> Run:
     """Return the first fiftieth of a flight, which warms its solver up."""
     scenario = _begun(run.scenario)
     settings = {name: value for name, value in run.settings.items() if name not in ("times", "max_step")}
-    few: dict[str, Any] = {"steps": 16} if "steps" in settings else {"times": [scenario.duration]}
-    return replace(run, scenario=scenario, settings=settings | few)
+    short_settings: dict[str, Any] = {"steps": 16} if "steps" in settings else {"times": [scenario.duration]}
+    return replace(run, scenario=scenario, settings=settings | short_settings)
 
 
 def _timed_result(run: Run, times: FloatArray) -> RunResult:

@@ -43,12 +43,12 @@ def check_own(folder: Path, kind: str, ignored: Iterable[str] = ()) -> None:
 
     The OutputError names the folder and what stands in it; ``ignored`` names, such as that of a lock, do not count.
     """
-    others = sorted({entry.name for entry in folder.iterdir()} - {*LEFT_BY_DESKTOPS, *ignored})
-    if not others:
+    names = sorted({entry.name for entry in folder.iterdir()} - {*LEFT_BY_DESKTOPS, *ignored})
+    if not names:
         return
-    if MARKER not in others:
-        words = f"{folder} holds {_some(others)} and not flipproof's own marker {MARKER}; name an empty or a new folder"
-        if "summary.json" in others or "sweep.sqlite" in others:
+    if MARKER not in names:
+        words = f"{folder} holds {_some(names)} and not flipproof's own marker {MARKER}; name an empty or a new folder"
+        if "summary.json" in names or "sweep.sqlite" in names:
             words += ", or move this one away if an older flipproof wrote it"
         raise OutputError(words)
     facts = _read_marker(folder)
@@ -149,9 +149,9 @@ def _hold(lock: Path, folder: Path) -> int:
             os.close(handle)
             if error.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK):
                 raise OutputError(f"{folder} cannot be locked ({error.strerror})") from None
-            who = f"process {number}" if number.isdecimal() else "another process"
+            owner = f"process {number}" if number.isdecimal() else "another process"
             raise OutputError(
-                f"{folder} is being written by another flipproof ({who}); wait for it or name another folder"
+                f"{folder} is being written by another flipproof ({owner}); wait for it or name another folder"
             ) from None
         os.close(handle)
 

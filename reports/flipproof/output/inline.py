@@ -56,8 +56,8 @@ def shape(svg: str) -> Markup:
         return Markup("")
     width, height = map(float, match.groups())
     letters = [100.0 * float(scale) for scale in LETTERS.findall(svg)]
-    least = width * 9.0 / min(letters, default=9.0)
-    return Markup(' width="{}" height="{}" style="--least:{}px"').format(round(width), round(height), round(least))
+    min_width = width * 9.0 / min(letters, default=9.0)
+    return Markup(' width="{}" height="{}" style="--least:{}px"').format(round(width), round(height), round(min_width))
 
 
 def _rounded(match: re.Match[str]) -> str:

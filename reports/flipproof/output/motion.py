@@ -97,14 +97,14 @@ def release_point(scenario: Scenario, r_cm: float) -> FloatArray:
     return r_cm * np.array([np.sin(scenario.theta0), -np.cos(scenario.theta0)])
 
 
-def motion_data(throw: Scenario, made: Mapping[str, RunResult]) -> dict[str, Any] | None:
+def motion_data(throw: Scenario, runs: Mapping[str, RunResult]) -> dict[str, Any] | None:
     """Return what the player needs, ready for JSON; None if no solver flew.
 
-    ``throw`` is that of all runs, cut as they were; of ``made``, by name, those in ``FLOWN`` are shown, and one that
+    ``throw`` is that of all runs, cut as they were; of ``runs``, by name, those in ``FLOWN`` are shown, and one that
     failed with its reason.
     """
     times = np.linspace(0.0, throw.duration, FRAMES)
-    results = {name: made[name] for name in FLOWN if name in made}
+    results = {name: runs[name] for name in FLOWN if name in runs}
     shown = {
         name: flight_of(result.trajectory, times) for name, result in results.items() if result.trajectory is not None
     }

@@ -38,10 +38,10 @@ def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> None:
     across = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)  # Eq. 11a
     bodies = {"tube": [bottle.mass, across, bottle.mass * bottle.radius**2, across]}
     bodies |= {f"slice_{i}": [throw.slice_mass, *[SLICE_INERTIA] * 3] for i in range(throw.n_slices)}
-    off = bottle.length / 2 - float(flight.r_cm[0])
+    offset = bottle.length / 2 - float(flight.r_cm[0])
     sine, cosine, (drift_x, drift_y) = math.sin(throw.theta0), math.cos(throw.theta0), throw.launch_velocity
-    qpos = [off * sine, -off * cosine, throw.theta0, *throw.initial_positions().tolist()]
-    qvel = [drift_x + throw.omega0 * off * cosine, drift_y + throw.omega0 * off * sine, throw.omega0]
+    qpos = [offset * sine, -offset * cosine, throw.theta0, *throw.initial_positions().tolist()]
+    qvel = [drift_x + throw.omega0 * offset * cosine, drift_y + throw.omega0 * offset * sine, throw.omega0]
     qvel += [0.0] * throw.n_slices
     impacts = [asdict(hit) for hit in flight.impacts or ()]
     scene = "scene.urdf" if form == "urdf" else "scene.xml"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-HERE = Path(__file__).resolve().parent
+FOLDER = Path(__file__).resolve().parent
 
 
 def held(engine: str, scene: str) -> Any:
@@ -45,9 +45,9 @@ def held(engine: str, scene: str) -> Any:
 
 
 if __name__ == "__main__":
-    facts = json.loads((HERE / "scene.json").read_text(encoding="utf-8"))
+    facts = json.loads((FOLDER / "scene.json").read_text(encoding="utf-8"))
     meant = np.array(list(facts["bodies"].values()))
-    found = held(sys.argv[1], str(HERE / facts["scene"]))
-    apart = float(np.abs(found / meant - 1).max()) if found.shape == meant.shape else np.inf
-    print(f"{sys.argv[1]}: {len(found)} bodies of {len(meant)}, masses and inertias within {apart:.1e}")
+    actual = held(sys.argv[1], str(FOLDER / facts["scene"]))
+    apart = float(np.abs(actual / meant - 1).max()) if actual.shape == meant.shape else np.inf
+    print(f"{sys.argv[1]}: {len(actual)} bodies of {len(meant)}, masses and inertias within {apart:.1e}")
     sys.exit(not apart <= 1e-6)

@@ -70,8 +70,8 @@ def read_curve(path: Path) -> Curve:
     names, rows = read_cells(path)
     quantities = [name for name in QUANTITIES if name in names]
     if "t" not in names or not quantities:
-        what = "t" if "t" not in names else f"of {', '.join(QUANTITIES)}"
-        raise ValueError(f"{path}: the header has no column {what}; it has {shortened(', '.join(names), 80)}")
+        missing = "t" if "t" not in names else f"of {', '.join(QUANTITIES)}"
+        raise ValueError(f"{path}: the header has no column {missing}; it has {shortened(', '.join(names), 80)}")
     notes: tuple[str, ...] = ()
     release = 0.0
     if flight := flight_in(path, names, rows):

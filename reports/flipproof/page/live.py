@@ -78,8 +78,8 @@ def touch_data(touch: Touch) -> dict[str, Any]:
     t = np.linspace(longest[0], longest[-1], min(POINTS, len(longest)))
     values = {name: np.interp(t, *curve, left=np.nan, right=np.nan) for name, curve in touch.curves.items()}
     if touch.limits is not None:  # logarithms of absolute values, none below a tenth of the axis's end
-        least = touch.limits[0] / 10
-        values = {name: np.log10(np.maximum(np.abs(curve), least)) for name, curve in values.items()}
+        floor = touch.limits[0] / 10
+        values = {name: np.log10(np.maximum(np.abs(curve), floor)) for name, curve in values.items()}
     finite = np.concatenate([curve[np.isfinite(curve)] for curve in values.values()])
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
     room = 0.04 * (high - low) or 1.0

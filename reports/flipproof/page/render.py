@@ -106,8 +106,8 @@ def render(
     parts = sections(gathered, results, templates)
     screens = [(id_, words) for id_, words in STORY.items() if id_ != "bottles" or facts.map]
     body = (*parts, *behind(parts, templates, context))
-    rest = [("evidence", "The verdict in numbers"), *((section.id, section.title) for section in body)]
+    contents = [("evidence", "The verdict in numbers"), *((section.id, section.title) for section in body)]
     return {
         "index.html": templates.get_template("story.html.j2").render(context, contents=screens),
-        "evidence.html": templates.get_template("evidence.html.j2").render(context, contents=rest, sections=body),
+        "evidence.html": templates.get_template("evidence.html.j2").render(context, contents=contents, sections=body),
     }

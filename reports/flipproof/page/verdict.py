@@ -177,8 +177,8 @@ def answer(headlines: Sequence[Headline]) -> str:
     weight = "pair" in by_id and by_id["pair"].what == RUNG_NAMES["weightless"]
     solved = "program-eq8" not in by_id or by_id["program-eq8"].value <= PARTING_BAND
     physics = "Eq. 8 lets gravity slide water along the bottle" if weight else "Eq. 8 is not free flight"
-    other = "the paper’s program solves another equation; shorter time steps would not help"
-    program = ". The program’s time steps are short enough" if solved else f", and {other}"
+    other_equation = "the paper’s program solves another equation; shorter time steps would not help"
+    program = ". The program’s time steps are short enough" if solved else f", and {other_equation}"
     water = "for water, half full or more, rods (slices without overlap) are the best guess."
     instead = f"For slices, use free flight; {water}"
     return {

@@ -246,10 +246,10 @@ LONG_THIN: Final = 3
 def bottle_of_aspect(aspect: float) -> Bottle:
     """Return the paper's bottle with L / 2R = ``aspect`` > 0 and pi R^2 L kept, capacity and mass too."""
     bottle = paper_throw().bottle
-    own = bottle.length / (2 * bottle.radius)
-    if aspect == own:
+    paper_aspect = bottle.length / (2 * bottle.radius)
+    if aspect == paper_aspect:
         return bottle
-    stretch = (aspect / own) ** (1 / 3)
+    stretch = (aspect / paper_aspect) ** (1 / 3)
     return replace(bottle, length=bottle.length * stretch**2, radius=bottle.radius / stretch)
 
 

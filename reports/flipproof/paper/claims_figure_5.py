@@ -123,11 +123,11 @@ def _elastic_rises_late(flights: CaseFlights, damping: str = "") -> Iterator[Rea
 def _angle_hardly_depends_on_rebound(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     sticky, half = (flights.at("beta" + damping, beta) for beta in (0.0, -0.5))
     apart = np.abs(half.theta - np.interp(half.t, sticky.t, sticky.theta))
-    most, time = float(apart.max()), half.t[int(apart.argmax())]
+    max_apart, time = float(apart.max()), half.t[int(apart.argmax())]
     turned = abs(float(half.theta[-1] - half.theta[0]))
     name, unit = "largest difference of θ for β = 0 and β = −0.5", "of the angle turned"
-    note = f"{math.degrees(most):.1f}° of {math.degrees(turned):.0f}°, at t = {time:.3f} s"
-    yield Reading(name, most / turned, unit, at_most(SUPERIMPOSED), note=note)
+    note = f"{math.degrees(max_apart):.1f}° of {math.degrees(turned):.0f}°, at t = {time:.3f} s"
+    yield Reading(name, max_apart / turned, unit, at_most(SUPERIMPOSED), note=note)
 
 
 def flat_plateau(run: Trajectory) -> Iterator[Reading]:
@@ -171,13 +171,13 @@ def _other_rebounds_rise_late(flights: CaseFlights, damping: str = "") -> Iterat
 )
 def _few_slices(flights: CaseFlights, damping: str = "") -> Iterator[Reading]:
     finest = _finest(flights, damping)
-    most = finest.scenario.n_slices
-    off = flights.measured("slices" + damping, lambda run: observe.distance(run, finest), high=most - 1)
-    least = min(off[2.0], off[5.0])
-    far = max(value for count, value in off.items() if count not in (2.0, 5.0))
-    name = f"distance from {most} slices: the smaller of N = 2 and 5 minus the largest from N = 10 on"
-    note = ", ".join(f"N = {count:g}: {value:.3f}" for count, value in off.items())
-    yield Reading(name, least - far, OMEGA, at_least(0.0), off[max(off)], note)
+    n_finest = finest.scenario.n_slices
+    distances = flights.measured("slices" + damping, lambda run: observe.distance(run, finest), high=n_finest - 1)
+    min_distance = min(distances[2.0], distances[5.0])
+    far = max(value for count, value in distances.items() if count not in (2.0, 5.0))
+    name = f"distance from {n_finest} slices: the smaller of N = 2 and 5 minus the largest from N = 10 on"
+    note = ", ".join(f"N = {count:g}: {value:.3f}" for count, value in distances.items())
+    yield Reading(name, min_distance - far, OMEGA, at_least(0.0), distances[max(distances)], note)
 
 
 @_figure_5(
@@ -195,10 +195,10 @@ def _minimum_shifts(flights: CaseFlights, damping: str = "") -> Iterator[Reading
     if MANY_SLICES not in shift:
         raise Missing(f"{flights.solver} has not flown {MANY_SLICES:g} slices")
     last = shift.pop(MANY_SLICES)
-    count, most = max(shift.items(), key=itemgetter(1))
+    count, max_shift = max(shift.items(), key=itemgetter(1))
     # What the finest cut is still off by is at most what the one before it is off from it.
     name = "largest shift of the minimum, N = 10 to 99"
-    yield Reading(name, most, OMEGA, at_least(DETECTED), last, f"at N = {count:g}")
+    yield Reading(name, max_shift, OMEGA, at_least(DETECTED), last, f"at N = {count:g}")
     yield Reading("shift of the minimum, N = 100", last, OMEGA, at_most(DETECTED), last)
 
 
@@ -284,19 +284,19 @@ def _cost_of_steps(_: CaseFlights, program: str = "MATLAB") -> Iterator[Reading]
     silent="it is only solved event by event, with time steps of its own choice",
 )
 def _steps_are_enough(flights: CaseFlights) -> Iterator[Reading]:
-    off, against, fewer = {}, "the event-driven solution", ""
+    distances, against, fewer = {}, "the event-driven solution", ""
     for filling in numbers("figure-S1-filling"):
-        own = flights.at("filling", filling)
+        flight = flights.at("filling", filling)
         if flights.solver == PUBLISHED:
-            off[filling] = observe.distance(own, flights.run(MANY_STEPS_KEY.format(filling)))
+            distances[filling] = observe.distance(flight, flights.run(MANY_STEPS_KEY.format(filling)))
         else:
-            off[filling] = observe.distance(flights.run(SAME_STEPS_KEY.format(filling)), own)
+            distances[filling] = observe.distance(flights.run(SAME_STEPS_KEY.format(filling)), flight)
     if flights.solver == PUBLISHED:
         against, fewer = f"P = {MANY_STEPS}", _fewer_steps(flights)
-    worst, most = max(off.items(), key=itemgetter(1))
-    others = ", ".join(f"{off[filling]:.2g} at {filling:g}" for filling in off if filling != worst)
-    note = f"largest at M̃ = {worst:g}; {others}{fewer}"
-    yield Reading(f"distance of P = {paper_steps()} from {against}", most, OMEGA, at_most(0.01), note=note)
+    worst, max_distance = max(distances.items(), key=itemgetter(1))
+    other_fillings = ", ".join(f"{distances[filling]:.2g} at {filling:g}" for filling in distances if filling != worst)
+    note = f"largest at M̃ = {worst:g}; {other_fillings}{fewer}"
+    yield Reading(f"distance of P = {paper_steps()} from {against}", max_distance, OMEGA, at_most(0.01), note=note)
 
 
 def _fewer_steps(flights: CaseFlights) -> str:

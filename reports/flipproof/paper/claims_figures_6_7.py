@@ -33,10 +33,10 @@ _of_drag: Final = partial(states, throw="half full, β = −0.5, α as named (Fi
 )
 def _sensitive_to_drag(flights: CaseFlights) -> Iterator[Reading]:
     settled = flights.at("drag", 0.01)
-    off = {drag: observe.distance(flights.at("drag", drag), settled) for drag in (0.0075, 0.0125)}
+    distances = {drag: observe.distance(flights.at("drag", drag), settled) for drag in (0.0075, 0.0125)}
     name = "distance of the curves for α = 0.0075 and 0.0125 from that for 0.01, the smaller"
-    note = ", ".join(f"{value:.3f} for {drag:g}" for drag, value in off.items())
-    yield Reading(name, min(off.values()), OMEGA, at_least(SUPERIMPOSED), note=note)
+    note = ", ".join(f"{value:.3f} for {drag:g}" for drag, value in distances.items())
+    yield Reading(name, min(distances.values()), OMEGA, at_least(SUPERIMPOSED), note=note)
 
 
 @_of_drag(
@@ -64,9 +64,9 @@ def _angle_grows_again_with_drag(flights: CaseFlights) -> Iterator[Reading]:
 
 def _strong_drag_turns_back(flights: CaseFlights) -> Iterator[Reading]:
     lowest = {drag: float(observe.normalised(flights.at("drag", drag)).min()) for drag in STRONG_DRAGS}
-    drag, least = min(lowest.items(), key=itemgetter(1))
+    drag, min_omega = min(lowest.items(), key=itemgetter(1))
     note = f"for α = {drag:g}; Eq. 12 keeps the sign of ω, so that θ can never turn back"
-    yield Reading("lowest ω", least, OMEGA, at_most(0.0), note=note)
+    yield Reading("lowest ω", min_omega, OMEGA, at_most(0.0), note=note)
 
 
 def _strong_drag_oscillates(flights: CaseFlights) -> Iterator[Reading]:
@@ -141,7 +141,7 @@ _of_filling: Final = partial(states, throw="α = 0.01 kg/s, β = −0.5, m = 1 g
 INTERMEDIATE: Final = (0.2, 0.75)
 """Intermediate fillings: those of the experiment but for 0.1, rounded outwards to the optimum."""
 
-MOST: Final = math.nextafter(0.5, 1.0)
+MAJORITY: Final = math.nextafter(0.5, 1.0)
 RANGE_NAME: Final = f"share of the fillings from {INTERMEDIATE[0]:g} to {INTERMEDIATE[1]:g} with ω_f/ω₀ in 0.2 to 0.5"
 
 SLOW_WHY: Final = "“Slower” is a word of ours for ω below 0.8 ω₀, “not slower” for above 0.9 ω₀."
@@ -156,7 +156,7 @@ SLOW_WHY: Final = "“Slower” is a word of ours for ω below 0.8 ω₀, “not
 )
 def _plateau_range(flights: CaseFlights) -> Iterator[Reading]:
     note = plateau_range_words(flights) + _by_points(flights)
-    yield Reading(RANGE_NAME, share_in_range(flights), "", at_least(MOST), note=note)
+    yield Reading(RANGE_NAME, share_in_range(flights), "", at_least(MAJORITY), note=note)
 
 
 def share_in_range(flights: CaseFlights) -> float:
@@ -272,6 +272,6 @@ def _best_filling(flights: CaseFlights) -> Iterator[Reading]:
     levels = flights.measured("filling", level)
     inside = flights.measured("filling", level, *OPTIMUM)
     best, lowest = min(inside.items(), key=itemgetter(1))
-    rival, other = min(((filling, levels[filling]) for filling in levels if filling not in inside), key=itemgetter(1))
-    note = f"{lowest:.3f} at M̃ = {best:g}, {other:.3f} at {rival:g}"
-    yield Reading("lowest ω_f outside 0.2 to 0.5 minus lowest inside", other - lowest, OMEGA, at_least(0.0), note=note)
+    rival, second = min(((filling, levels[filling]) for filling in levels if filling not in inside), key=itemgetter(1))
+    note = f"{lowest:.3f} at M̃ = {best:g}, {second:.3f} at {rival:g}"
+    yield Reading("lowest ω_f outside 0.2 to 0.5 minus lowest inside", second - lowest, OMEGA, at_least(0.0), note=note)

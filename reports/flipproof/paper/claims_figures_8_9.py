@@ -39,9 +39,9 @@ def _fast_spin_changes_only_time(flights: CaseFlights) -> Iterator[Reading]:
     usual = number("release-spin")
     levels, drops = (flights.measured("spin", read, low=usual) for read in (observe.level, observe.drop_time))
     change = {spin: abs(levels[spin] - levels[usual]) for spin in sorted(levels)}
-    worst, most = max(change.items(), key=itemgetter(1))
+    worst, max_change = max(change.items(), key=itemgetter(1))
     note = f"at {worst:g} rad/s"
-    yield Reading("largest change of ω_f/ω₀ above 20 rad/s", most, OMEGA, at_most(SUPERIMPOSED), note=note)
+    yield Reading("largest change of ω_f/ω₀ above 20 rad/s", max_change, OMEGA, at_most(SUPERIMPOSED), note=note)
     note = ", ".join(f"{drops[spin]:.3f} at {spin:g} rad/s" for spin in sorted(drops))
     name = "by how much each faster spin drops earlier, the least"
     yield Reading(name, _least_delay(drops), "of T", at_least(ONE_STEP), note=note)
@@ -85,10 +85,10 @@ def _angle_hardly_matters(
     flights: CaseFlights, apart: Callable[[Trajectory, Trajectory], float] = observe.shape_distance
 ) -> Iterator[Reading]:
     usual = flights.at("angle", number("release-angle"))
-    off = flights.measured("angle", lambda run: apart(run, usual))
-    worst, most = max(off.items(), key=itemgetter(1))
+    distances = flights.measured("angle", lambda run: apart(run, usual))
+    worst, max_distance = max(distances.items(), key=itemgetter(1))
     note = f"at θ₀ = {math.degrees(worst):.0f}°"
-    yield Reading("largest distance from the curve of π/2", most, OMEGA, at_most(SUPERIMPOSED), note=note)
+    yield Reading("largest distance from the curve of π/2", max_distance, OMEGA, at_most(SUPERIMPOSED), note=note)
 
 
 @states(
@@ -116,11 +116,11 @@ def _drop_is_later_near_vertical(flights: CaseFlights) -> Iterator[Reading]:
 )
 def _aspect_ratio_does_not_matter(flights: CaseFlights) -> Iterator[Reading]:
     bottle = paper_throw().bottle
-    own = flights.at("aspect", bottle.length / (2 * bottle.radius))
-    off = flights.measured("aspect", lambda run: observe.distance(run, own))
-    worst, most = max(off.items(), key=itemgetter(1))
+    paper_run = flights.at("aspect", bottle.length / (2 * bottle.radius))
+    distances = flights.measured("aspect", lambda run: observe.distance(run, paper_run))
+    worst, max_distance = max(distances.items(), key=itemgetter(1))
     name = "largest distance from the curve of the paper's bottle"
-    yield Reading(name, most, OMEGA, at_most(SUPERIMPOSED), note=f"at L / 2R = {worst:g}")
+    yield Reading(name, max_distance, OMEGA, at_most(SUPERIMPOSED), note=f"at L / 2R = {worst:g}")
 
 
 # ---------------------------------------------------------------------- landing (Fig. 9)
@@ -188,10 +188,10 @@ def lowered_by(run: Trajectory, when: When = upright) -> float:
 )
 def _dynamic_angle_is_lower(flights: CaseFlights, when: When = upright) -> Iterator[Reading]:
     lower = flights.measured("long", partial(lowered_by, when=when), high=0.75)
-    at, least = min(lower.items(), key=itemgetter(1))
+    at, min_lowering = min(lower.items(), key=itemgetter(1))
     above = ", ".join(f"{filling:g}" for filling, value in lower.items() if value <= 0.0)
     note = f"at M̃ = {at:g}; " + (f"not lower at {above}" if above else "lower at all fillings")
-    yield Reading("static minus dynamic θ_c, the least up to M̃ = 0.75", least, "°", at_least(0.0), note=note)
+    yield Reading("static minus dynamic θ_c, the least up to M̃ = 0.75", min_lowering, "°", at_least(0.0), note=note)
 
 
 @states(
@@ -204,10 +204,10 @@ def _dynamic_angle_is_lower(flights: CaseFlights, when: When = upright) -> Itera
     otherwise={ON_LANDING: {"when": at_landing_time}},
 )
 def _dynamic_angle_agrees_when_full(flights: CaseFlights, when: When = upright) -> Iterator[Reading]:
-    off = flights.measured("long", lambda run: abs(lowered_by(run, when)), low=0.9)
-    at, most = max(off.items(), key=itemgetter(1))
+    differences = flights.measured("long", lambda run: abs(lowered_by(run, when)), low=0.9)
+    at, max_difference = max(differences.items(), key=itemgetter(1))
     name = "largest difference of static and dynamic θ_c above M̃ = 0.75"
-    yield Reading(name, most, "°", at_most(3.0), note=f"at M̃ = {at:g}")
+    yield Reading(name, max_difference, "°", at_most(3.0), note=f"at M̃ = {at:g}")
 
 
 @states(
@@ -266,5 +266,5 @@ def claim_filling_of_change() -> Finding:
         "maximising Eq. 13b. Water that lies higher is thrown towards the cap. Slices may overlap and sink towards the "
         "base first: in free flight the first of them goes over to the cap at 0.13 to 0.14"
     )
-    off = max(abs(surface - closed), abs(peak - closed))
-    return regression("paper-filling-of-change", title, off, "", (0.0, 1e-6), note)
+    error = max(abs(surface - closed), abs(peak - closed))
+    return regression("paper-filling-of-change", title, error, "", (0.0, 1e-6), note)

@@ -16,7 +16,7 @@ import numpy as np
 from flipproof.paper.cases import ICE, paper_throw
 from flipproof.paper.claims_figures_6_7 import (
     CLEAR,
-    MOST,
+    MAJORITY,
     RANGE_NAME,
     filling_of_slow_down,
     plateau_range_words,
@@ -81,9 +81,9 @@ class Observation:
         }
         if not misses or not self.ranked:
             return ()
-        least, band = min(misses.values())
+        min_miss, band = min(misses.values())
         # Arithmetic alone explains a difference below 1e-12.
-        return tuple(solver for solver, (miss, own) in misses.items() if miss <= least + band + own + 1e-12)
+        return tuple(solver for solver, (miss, margin) in misses.items() if miss <= min_miss + band + margin + 1e-12)
 
     @property
     def discriminates(self) -> bool:
@@ -198,7 +198,7 @@ OBSERVATIONS: Final = (
         means=RANGE_NAME,
         read=share_in_range,
         unit="",
-        measured=(MOST, 1.0),
+        measured=(MAJORITY, 1.0),
         why="“Most” is more than half; the range is the paper's, the choice of fillings ours.",
         numbers=plateau_range_words,
         remark="The only interval that the text measures. It stands above among what the paper says of its model, too.",

@@ -27,7 +27,7 @@ SHARE: Final = Axis("t / T [1]", "t/T [1]", 0.0, 1.0)
 class Quantity:
     """What is drawn over time; ``curve`` reads abscissa and ordinate off a flight.
 
-    In the alternative text ``plotted`` says what is drawn against what, and ``said`` which ``number``, with how many
+    In the alternative text ``plotted`` says what is drawn against what, and ``subject`` which ``number``, with how many
     ``digits`` after the point, stands for a curve.
     """
 
@@ -35,7 +35,7 @@ class Quantity:
     y: Axis
     curve: Callable[[Trajectory], tuple[FloatArray, FloatArray]]
     plotted: str
-    said: str
+    subject: str
     number: Callable[[Trajectory], float]
     digits: int = 3
 
@@ -186,7 +186,7 @@ def _exhibits_curves(name: str, runs: PaperRuns) -> Iterator[Exhibit]:
     sentences: list[str] = []
     for of in shown.families:
         words = VARIED[of][2]
-        words = words.capitalize() if sentences else f"{quantity.said} {words}".rstrip()
+        words = words.capitalize() if sentences else f"{quantity.subject} {words}".rstrip()
         sentences.append(f"{words}: {panels.listed(partial(_numbers, runs, quantity, of), quantity.digits)}.")
     alt = f"Line plots of {quantity.plotted}{count} by three solvers. {' '.join(sentences)}"
     grid = Grid(quantity.x, rows, shown.height, legend_columns=shown.legend_columns)
@@ -234,9 +234,9 @@ def _steps(runs: PaperRuns, solver: str) -> Iterator[Line]:
 def _step_words(runs: PaperRuns) -> Iterator[str]:
     for filling in numbers("figure-S1-filling"):
         by_value = {case.value: run for case, run in runs.members(PUBLISHED, f"steps {filling:g}")}
-        *fewer, most = sorted(by_value) or [0.0]
+        *fewer, max_steps = sorted(by_value) or [0.0]
         for steps in fewer:
-            run, finest = by_value[steps], by_value[most]
+            run, finest = by_value[steps], by_value[max_steps]
             reference = np.interp(run.t, finest.t, finest.omega)
             far = float(np.abs(run.omega - reference).max()) / run.scenario.omega0
             yield f"filling {filling:g} with {steps:g} steps {far:.2g}"

@@ -46,7 +46,7 @@ class Points:
 def _points(runs: PaperRuns, label: str, family: str, of: Callable[[Trajectory], float], *, filled: bool) -> Points:
     """Return the points where there is a number, which is finite."""
     curves = {solver: [(case.value, of(run)) for case, run in runs.members(solver, family)] for solver in SOLVERS}
-    finite = {solver: {at: value for at, value in own if math.isfinite(value)} for solver, own in curves.items()}
+    finite = {solver: {at: value for at, value in points if math.isfinite(value)} for solver, points in curves.items()}
     return Points(label, filled, finite)
 
 
@@ -92,8 +92,8 @@ def _exhibits_9b(runs: PaperRuns) -> Iterator[Exhibit]:
 def _exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
     upright, landed = _at_two_moments(runs, lambda moment: moment.v_cm)
     curves = [abs(v) for points in (upright, landed) for values in points.values.values() for v in values.values()]
-    most = 1.1 * max([*curves, 0.25])
-    row = _row(Axis("v_CM in the bottle [m/s], to the base", "v_CM [m/s]", -most, most), (upright, landed))
+    v_limit = 1.1 * max([*curves, 0.25])
+    row = _row(Axis("v_CM in the bottle [m/s], to the base", "v_CM [m/s]", -v_limit, v_limit), (upright, landed))
     shades = (
         panels.Shade("x", 0.25, 0.6, "where the paper has it beyond 0.2 m/s"),
         panels.Shade("y", -0.2, 0.2, "slower than 0.2 m/s"),
@@ -138,19 +138,19 @@ def _exhibits_cost(over: str, runs: PaperRuns) -> Iterator[Exhibit]:
 
     def lines(solver: str, of: str) -> Iterator[Line]:
         for rank, value in enumerate(every):
-            own = [cost for cost in costs if cost.solver == solver and getattr(cost, kept) == value]
-            if len(own) > 1:
-                x, y = np.array(sorted((getattr(cost, over), getattr(cost, of)) for cost in own), dtype=np.float64).T
+            chosen = [cost for cost in costs if cost.solver == solver and getattr(cost, kept) == value]
+            if len(chosen) > 1:
+                x, y = np.array(sorted((getattr(cost, over), getattr(cost, of)) for cost in chosen), dtype=np.float64).T
                 look = {**panels.ranked(rank, len(every)), "marker": "o", "markersize": 4.0}
                 yield Line(f"{symbol} = {value}", x, y, look)
 
     work = Axis("work [slice evaluations]", "work [1]", log=True)
     seconds = Axis("processor time [s]", "processor time [s]", log=True)
     rows = (panels.row_of(work, partial(lines, of="work")), panels.row_of(seconds, partial(lines, of="seconds")))
-    own = [cost for cost in costs if cost.solver == PUBLISHED]
-    ends = sorted((getattr(cost, over), cost.work) for cost in own if getattr(cost, kept) == every[-1])
-    (few, less), (many, more) = ends[0], ends[-1]
-    exponent = math.log(more / less) / math.log(many / few)
+    published = [cost for cost in costs if cost.solver == PUBLISHED]
+    ends = sorted((getattr(cost, over), cost.work) for cost in published if getattr(cost, kept) == every[-1])
+    (n_first, work_first), (n_last, work_last) = ends[0], ends[-1]
+    exponent = math.log(work_last / work_first) / math.log(n_last / n_first)
     yield panels.exhibit_grid(
         name, f"what a run costs over its number of {words}",
         "Counted work above, processor time of this machine below. The published program's work is N P by "
@@ -158,7 +158,7 @@ def _exhibits_cost(over: str, runs: PaperRuns) -> Iterator[Exhibit]:
         "cost of a run dominates. The others evaluate their right-hand side as often as the impacts ask; their output "
         "times cost nothing.",
         f"Log-log plots of work and processor time by three solvers. The published program's work grows as the power "
-        f"{exponent:.2f}; the longest of its runs took {max(cost.seconds for cost in own):.2g} s.",
+        f"{exponent:.2f}; the longest of its runs took {max(cost.seconds for cost in published):.2g} s.",
         Grid(x, rows),
     )  # fmt: skip
 

@@ -214,10 +214,10 @@ def every_third(values: FloatArray) -> FloatArray:
 
 def settings_words() -> str:
     """Return how the runs were made: slices and bands, each as "1e-7" or "0.003"."""
-    own = ", ".join(f"{f'{band:g}'.replace('e-0', 'e-')} ({SPOKEN[solver]})" for solver, band in BANDS.items())
+    bands = ", ".join(f"{f'{band:g}'.replace('e-0', 'e-')} ({SPOKEN[solver]})" for solver, band in BANDS.items())
     return (
         f"Every solver has the paper's own slices, and the published program its steps; Eq. 8 and free flight are "
-        f"solved exactly between impacts. As fractions of ω₀ the event-driven ω is certain to {own}."
+        f"solved exactly between impacts. As fractions of ω₀ the event-driven ω is certain to {bands}."
     )
 
 

@@ -132,9 +132,9 @@ def distance(run: Trajectory, other: Trajectory, stretch: float = 1.0, delay: fl
     """
     if not math.isfinite(stretch + delay):
         return math.nan
-    moments = run.t / run.scenario.duration / stretch - delay
-    both = (moments >= 0.0) & (moments <= 1.0)
-    curve = np.interp(moments[both], other.t / other.scenario.duration, normalised(other))
+    times = run.t / run.scenario.duration / stretch - delay
+    both = (times >= 0.0) & (times <= 1.0)
+    curve = np.interp(times[both], other.t / other.scenario.duration, normalised(other))
     return float(np.sqrt(np.mean((normalised(run)[both] - curve) ** 2)))
 
 
@@ -173,7 +173,7 @@ def departures(run: Trajectory) -> list[Departure]:
     scenario = run.scenario
     pull = (run.omega**2)[:, np.newaxis] * (run.r - run.r_cm[:, np.newaxis])
     weight = (scenario.gravity * np.cos(run.theta))[:, np.newaxis]
-    found = []
+    events = []
     for end, wall in ((BASE, scenario.r_max), (CAP, scenario.r_min)):
         gap, outward = end * (wall - run.r), end * (pull + weight)
         near = gap <= 1e-3
@@ -181,5 +181,5 @@ def departures(run: Trajectory) -> list[Departure]:
             rests = np.flatnonzero(np.diff(gap[: k + 1, i]) <= 0.0)
             began = int(rests[-1]) + 1 if rests.size else 0
             force, later = outward[[began, min(began + 1, len(outward) - 1)], i].tolist()
-            found.append(Departure(float(run.t[began]), force, abs(later - force)))
-    return sorted(found)
+            events.append(Departure(float(run.t[began]), force, abs(later - force)))
+    return sorted(events)

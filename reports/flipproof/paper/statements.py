@@ -173,7 +173,7 @@ class Judgement:
     readings : all must hold; see ``deciding`` for the one that speaks for them
     aside : str - why there is no number
     flown : str - slices, and steps where they are chosen, of the flights that were read
-    others : (words, judgement) of every other sense that the text allows
+    senses : (words, judgement) of every other sense that the text allows
     silent : str - why the statement says nothing about this equation; empty if it does
     """
 
@@ -181,7 +181,7 @@ class Judgement:
     readings: tuple[Reading, ...] = ()
     aside: str = ""
     flown: str = ""
-    others: tuple[tuple[str, Judgement], ...] = ()
+    senses: tuple[tuple[str, Judgement], ...] = ()
     silent: str = ""
 
     @property
@@ -214,7 +214,7 @@ class Judgement:
         """All readings, the flights and the other senses of the text, as one line."""
         parts = [reading.words for reading in self.readings]
         parts += [words for words in (self.flown, self.silent, self.aside) if words]
-        for sense, judgement in self.others:
+        for sense, judgement in self.senses:
             deciding = judgement.deciding
             number = f", {deciding.name} {deciding.value_text}, {deciding.margin_text}" if deciding else ""
             reason = f", {judgement.aside}" if judgement.aside else ""
@@ -230,7 +230,7 @@ class Judgement:
             "aside": self.silent or self.aside,
             "flown": self.flown,
             "readings": [reading.to_mapping() for reading in self.readings],
-            "others": [{"sense": sense, **judgement.to_mapping()} for sense, judgement in self.others],
+            "others": [{"sense": sense, **judgement.to_mapping()} for sense, judgement in self.senses],
         }
 
 
@@ -310,7 +310,7 @@ class Statement:
 
 
 def states(
-    id_: str, *, otherwise: Mapping[str, Mapping[str, Any] | Read] = MappingProxyType({}), **about: Any
+    id_: str, *, otherwise: Mapping[str, Mapping[str, Any] | Read] = MappingProxyType({}), **fields: Any
 ) -> Callable[[Read], Statement]:
     """Return a decorator that makes a statement of what reads its numbers.
 
@@ -322,7 +322,7 @@ def states(
             (words, partial(read, **sense) if isinstance(sense, Mapping) else sense)
             for words, sense in otherwise.items()
         )
-        return Statement(id=id_, read=read, otherwise=tuple(senses), **about)
+        return Statement(id=id_, read=read, otherwise=tuple(senses), **fields)
 
     return stated
 
@@ -333,8 +333,8 @@ def judge(statement: Statement, flights: CaseFlights) -> Judgement:
         return Judgement(solver=flights.solver, silent=statement.silent)
     if statement.of_steps:
         flights = replace(flights, half_steps=None)
-    others = tuple((words, judge_sense(read, flights)) for words, read in statement.otherwise)
-    return replace(judge_sense(statement.read, flights), others=others)
+    senses = tuple((words, judge_sense(read, flights)) for words, read in statement.otherwise)
+    return replace(judge_sense(statement.read, flights), senses=senses)
 
 
 def judge_sense(read: Read, flights: CaseFlights) -> Judgement:
@@ -344,7 +344,7 @@ def judge_sense(read: Read, flights: CaseFlights) -> Judgement:
     slices and what half the steps change.
     """
     flights = replace(flights, seen={})
-    own = BANDS.get(flights.solver, 0.0)
+    solver_band = BANDS.get(flights.solver, 0.0)
     readings = []
     try:
         usual = tuple(read(flights))
@@ -352,6 +352,6 @@ def judge_sense(read: Read, flights: CaseFlights) -> Judgement:
     except Missing as reason:
         return Judgement(solver=flights.solver, aside=str(reason))
     for k, reading in enumerate(usual):
-        moved = sum(abs(reading.value - others[k].value) for others in coarser)
-        readings.append(replace(reading, band=reading.band + (own if reading.unit == OMEGA else 0.0) + moved))
+        moved = sum(abs(reading.value - coarse_readings[k].value) for coarse_readings in coarser)
+        readings.append(replace(reading, band=reading.band + (solver_band if reading.unit == OMEGA else 0.0) + moved))
     return Judgement(solver=flights.solver, readings=tuple(readings), flown=flights.flown)

@@ -71,11 +71,11 @@ class PaperVerdicts:
         return " ".join(map(self._lead_of, SOLVERS))
 
     def _lead_of(self, solver: str) -> str:
-        judged = [
+        judgements = [
             (statement.kind, by) for statement in self.statements for by in statement.judgements if by.solver == solver
         ]
-        claims = [by for kind, by in judged if kind == "claim"]
-        limits = [by for kind, by in judged if kind == "admitted limit"]
+        claims = [by for kind, by in judgements if kind == "claim"]
+        limits = [by for kind, by in judgements if kind == "admitted limit"]
         of = Counter(judgement.verdict for judgement in claims)
         marginal = sum(judgement.marginal for judgement in claims)
         has = sum(judgement.verdict == "holds" for judgement in limits)

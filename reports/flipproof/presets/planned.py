@@ -236,15 +236,15 @@ def waterfall_csv(waterfalls: tuple[Waterfall, ...]) -> str:
     header = ["observable", "unit", "bar", "forward", "backward", "mean of all orders", "forward band", "mean band"]
     rows: list[list[Any]] = []
     for waterfall in waterfalls:
-        what = (waterfall.observable.name, waterfall.observable.unit)
+        observable = (waterfall.observable.name, waterfall.observable.unit)
         rows += [
-            [*what, "published program", waterfall.start, "", "", "", ""],
+            [*observable, "published program", waterfall.start, "", "", "", ""],
             *(
-                [*what, b.name, b.forward, b.backward, b.average, b.forward_band, b.average_band]
+                [*observable, b.name, b.forward, b.backward, b.average, b.forward_band, b.average_band]
                 for b in waterfall.bars
             ),
-            [*what, "free flight", waterfall.end, "", "", waterfall.end_band, ""],
-            [*what, "rods", waterfall.rods, "", "", "", ""],
+            [*observable, "free flight", waterfall.end, "", "", waterfall.end_band, ""],
+            [*observable, "rods", waterfall.rods, "", "", "", ""],
         ]
     return rows_csv(header, rows, digits=None)
 

@@ -123,17 +123,17 @@ def own_folder(out: Path, kind: str) -> None:
 
 
 def _say_what_differs(store: Store, say: Callable[[str], object]) -> None:
-    code, own = code_identity(), versions()
+    code, current = code_identity(), versions()
     codes = sorted({str(facts.get("code")) for facts in store.shared()} - {code})
     if codes:
         say(f"{store.path} holds rows by flipproof {', '.join(codes)} too; this is {code} and takes none of them")
     there = [facts.get("versions", {}) for facts in store.shared() if facts.get("code") == code]
-    for name, version in own.items():
-        others = sorted(
+    for name, version in current.items():
+        stored = sorted(
             {str(row_versions[name]) for row_versions in there if row_versions.get(name, version) != version}
         )
-        if others:
-            say(f"{store.path} holds rows made under {name} {', '.join(others)}; this is {version}, and they are kept")
+        if stored:
+            say(f"{store.path} holds rows made under {name} {', '.join(stored)}; this is {version}, and they are kept")
 
 
 @contextmanager

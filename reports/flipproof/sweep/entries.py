@@ -38,7 +38,7 @@ def read_entries(tables: object, source: str) -> tuple[Entry, ...]:
     entries: list[Entry] = []
     for number, table in enumerate(tables, start=1):
         entry = _entry(dict(table), f"{source}: [[solvers]] {number}")
-        if any((entry.name, entry.settings) == (other.name, other.settings) for other in entries):
+        if any((entry.name, entry.settings) == (earlier.name, earlier.settings) for earlier in entries):
             raise SweepError(f"{entry.where} is there twice with the same settings")
         entries.append(entry)
     return tuple(entries)

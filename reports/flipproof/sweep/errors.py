@@ -11,11 +11,11 @@ class SweepError(ValueError):
     """The sweep cannot begin or go on; the message says where, why, and what to change."""
 
 
-def refuse_unknown(what: str, given: Iterable[object], known: Collection[str]) -> None:
-    """Refuse the first name that is not known, with the nearest one that is; ``what`` leads to it."""
+def refuse_unknown(label: str, given: Iterable[object], choices: Collection[str]) -> None:
+    """Refuse the first name that is not known, with the nearest one that is; ``label`` leads to it."""
     for name in given:
-        if name not in known:
-            raise SweepError(unknown_name(what, name, known))
+        if name not in choices:
+            raise SweepError(unknown_name(label, name, choices))
 
 
 def refuse(problem: str) -> None:

@@ -56,7 +56,7 @@ def fill(
         If the store cannot be written.
     """
     code, counts = code_identity(), Counter[str]()
-    made_now, lost, suspects = 0, 0, set[bytes]()
+    n_new, lost, suspects = 0, 0, set[bytes]()
     again: list[Chunk] = []
     flying: dict[Future[WorkerResult], Chunk] = {}
     done: queue.SimpleQueue[Future[WorkerResult]] = queue.SimpleQueue()
@@ -80,7 +80,7 @@ def fill(
             flying[future] = chunk
             future.add_done_callback(done.put)
         if not flying:
-            return counts, made_now
+            return counts, n_new
         future = done.get()
         chunk = flying.pop(future)
         try:
@@ -108,7 +108,7 @@ def fill(
         if result.code != code:
             raise SweepError(f"a worker runs flipproof {result.code}, this is {code}; install the same in both")
         store.put(_entries(chunk, result, base))
-        made_now += len(result.rows)
+        n_new += len(result.rows)
         count(result.rows)
 
 

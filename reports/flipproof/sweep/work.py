@@ -114,9 +114,9 @@ def keyed(points: Iterable[Point], code: str) -> Iterator[tuple[bytes, str, Poin
     """Yield key, kind and point: the key is 16 bytes of a hash of the point and of the code that makes it."""
     last: tuple[Any, ...] = ()
     for point in points:
-        solver, throw, *others = point
-        if not last or any(previous is not current for previous, current in zip(last, (solver, *others), strict=True)):
-            last, kind = (solver, *others), kind_of(point)
+        solver, throw, *context = point
+        if not last or any(previous is not current for previous, current in zip(last, (solver, *context), strict=True)):
+            last, kind = (solver, *context), kind_of(point)
             begun = hashlib.blake2b(f"{code}\n{kind}\n".encode(), digest_size=16)
         whole = begun.copy()
         whole.update(json_of(throw).encode())
@@ -156,14 +156,14 @@ def versions() -> Mapping[str, str]:
 
 def make_points(code: str, points: Sequence[Point]) -> WorkerResult:
     """Make points of one kind in this process, or none if the caller's ``code``, or the solver's, is another here."""
-    own, first = code_identity(), points[0]
-    if own != code or _changed(first):
-        return WorkerResult(own, versions(), (), _changed(first))
+    current_code, first = code_identity(), points[0]
+    if current_code != code or _changed(first):
+        return WorkerResult(current_code, versions(), (), _changed(first))
     module, _, name = first.maker.partition(":")
     throws = [point.throw for point in points]
     rows = getattr(import_module(module), name)(first.solver, first.settings, throws, **first.options)
     changed = _changed(first)  # while they were made, too: then nobody knows by which
-    return WorkerResult(own, versions(), () if changed else rows, changed)
+    return WorkerResult(current_code, versions(), () if changed else rows, changed)
 
 
 def _changed(point: Point) -> str:
@@ -248,8 +248,8 @@ def read_flight(flight: Trajectory | Row) -> Row:
     if flight.impacts is None:
         reasons.append(f"{flight.method} counts no impacts")
     row["impacts"] = None if flight.impacts is None else len(flight.impacts)
-    own = {"t_end": float(flight.t[-1]), "status": flight.status, "message": flight.message}
-    return row | own | {"reason": "; ".join(reasons)}
+    ending = {"t_end": float(flight.t[-1]), "status": flight.status, "message": flight.message}
+    return row | ending | {"reason": "; ".join(reasons)}
 
 
 def _curves(flight: Trajectory | Row, points: int, names: Sequence[str]) -> Row:
