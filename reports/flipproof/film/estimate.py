@@ -68,6 +68,12 @@ EARTHLY: Final = 0.15
 DRAWS: Final = 8000
 """Sets of parameters drawn from the posterior."""
 
+TRUST: Final = 0.7
+"""Power of the likelihood with which the posterior is drawn: what it takes hands and clicks for is not quite so.
+
+Intervals are 1.2 times as wide as with 1, which held 85 to 91 % of another author's films. Evidence is not touched.
+"""
+
 UNITS: Final = {
     "gamma": "/s", "restitution": "", "omega0": "rad/s", "theta0": "rad", "release": "s", "touch": "s", "tilt": "deg",
     "g": "m/s^2", "noise": "m", "length": "m", "x0": "m", "y0": "m", "vx": "m/s", "vy": "m/s",
@@ -219,7 +225,7 @@ def _estimated(
     best = int(np.argmax(grid.levels))
     draws = _draws(likelihood, grid)
     times, costs, _ = _touches(likelihood, curves[best], fits[best].x)
-    chance = np.exp(costs.min() - costs)
+    chance = np.exp(TRUST * (costs.min() - costs))
     rng = np.random.default_rng(1)
     picked = rng.choice(len(times), DRAWS, p=chance / chance.sum())
     draws["touch"] = times[picked] + (times[1] - times[0]) * (rng.random(DRAWS) - 0.5)
@@ -439,17 +445,17 @@ def _descent(
 def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
     """Return draws of the posterior: a node, a place in its cell, and the other parameters given it."""
     rng = np.random.default_rng(0)
-    fits, chance = grid.fits, np.exp(grid.masses - grid.masses.max())
+    fits, chance = grid.fits, np.exp(TRUST * (grid.levels - grid.levels.max())) * grid.cells.prod(axis=1)
     picked = rng.choice(len(fits), DRAWS, p=chance / chance.sum())
     place = grid.nodes[picked] + (rng.random((DRAWS, 2)) - 0.5) * grid.cells[picked]
     inner = np.empty((DRAWS, len(fits[0].x)))
     at = likelihood.index["log_noise"]
     for k in np.unique(picked):
-        share = np.exp([mode.evidence - fits[k].evidence for mode in fits[k].modes])
+        share = np.exp([TRUST * (mode.evidence - fits[k].evidence) for mode in fits[k].modes])
         kinds = np.where(picked == k, rng.choice(len(share), DRAWS, p=share / share.sum()), -1)
         for kind, mode in enumerate(fits[k].modes):
             mine = kinds == kind
-            root = np.linalg.cholesky(np.linalg.inv(mode.hessian))
+            root = np.linalg.cholesky(np.linalg.inv(TRUST * mode.hessian))
             moved = rng.standard_normal((int(mine.sum()), len(root))) @ root.T
             # All deviations grow with the noise, which is a draw, too.
             wider = np.exp(moved[:, at : at + 1])

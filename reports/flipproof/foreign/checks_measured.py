@@ -160,14 +160,19 @@ def check_order_before(traits: Traits) -> Making:
             if without and min(without.values()) >= declared - ORDER_ROOM:
                 advice = f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}"
                 break
-    alike = worst == "omega" or len(orders) == 1 or min(orders.values()) == max(orders.values())
-    where = f"{worst} is taken or answered" if not alike else "omega, r_CM or J are taken"
+    low, kept = (
+        [name for name, order in orders.items() if (order < declared - ORDER_ROOM) == below] for below in (True, False)
+    )
+    if low and kept:
+        usual = f"{', '.join(kept)} of that order: look at how {' and '.join(low)} is advanced in a step, and answered"
+    else:
+        usual = "a coefficient of the step, or the instant at which omega, r_CM or J are taken, costs the order"
     return Found(
         holds=holds,
         expected=f"order {declared:g} or more, within {ORDER_ROOM}",
         came=f"{orders[worst]:.2f} ({worst})",
         where=f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves",
-        advice=advice or f"a coefficient of the step, or the instant at which {where}, costs the order",
+        advice=advice or usual,
         facts={"order_before_impacts": orders[worst], "orders": orders},
     )
 

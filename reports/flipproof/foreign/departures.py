@@ -211,7 +211,7 @@ def _told(equation: str, intervals: Sequence[Interval], astray: BoolArray) -> tu
     came = f"in {both} of {count} intervals between two outputs{words and ' ' + words}{others}"
     departed = [interval for interval, departs in zip(intervals, members & astray, strict=True) if departs]
     what = cause_of(departed, recoil=switches_of(equation).recoil)
-    if "look at" in what or (what and look_at in ("weight", "drag")):  # the terms are named
+    if "look at" in what or (what and look_at in ("weight", "drag", "odd")):  # the terms are named
         look_at = ""
     advice = f"look at {LOOK_AT[look_at]}" if look_at else ""
     return came, "; ".join(part for part in (what, advice) if part)
