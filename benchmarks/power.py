@@ -41,6 +41,7 @@ LISTS: Final[dict[str, dict[str, Any]]] = {
     "tenth": patches("tenth"),
     "eleventh": patches("eleventh"),
     "twelfth": patches("twelfth"),
+    "thirteenth": patches("thirteenth"),
     "right": dict(RIGHT),
 }
 """Mistakes by list and name, and solvers without one."""

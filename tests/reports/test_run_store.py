@@ -248,6 +248,7 @@ def test_a_flipped_byte_makes_the_run_again(place, column):
             rows.execute(f"UPDATE made SET {column} = ?", (value,))
             rows.commit()
             assert found(place) is None
+            assert rows.execute("SELECT count(*) FROM made").fetchone() == (0,)
             kept(place, RUN)
     again = found(place)
     assert same(replace(made, seconds=again.seconds), again)
