@@ -627,7 +627,8 @@ def check_equation(traits: Traits) -> Making:
         expected=declared,
         came=place.text + (f", but {strict}" if strict else ""),
         where=f"{len(THROWS)} throws of {THROWS[0].duration:g} to {THROWS[-1].duration:g} s",
-        advice=advice.removesuffix("; ") or "flipproof explain compares it with the declared equation, switch by switch",
+        advice=advice.removesuffix("; ")
+        or "flipproof explain compares it with the declared equation, switch by switch",
         weak=weak,
         facts={"place": place.to_mapping()},
     )
