@@ -77,7 +77,12 @@ def _of_impacts(intervals: Sequence[Interval], *, recoil: bool) -> str:
         return ""
     late = [_delay(i, i.hits[0][0]) for i in single]
     if np.mean(np.isfinite(late)) > 0.6:
-        return f"slices leave an end up to {np.nanmax(late):.1g} s late: look at how the time of an impact is found"
+        extent = f"{np.nanmax(np.abs(late)):.1g} s"
+        if np.nanmedian(late) < 0.0:
+            return (
+                f"slices are up to {extent} ahead: look at the rest of a step with an impact, and what is kept over it"
+            )
+        return f"slices leave an end up to {extent} late: look at how the time of an impact is found"
     struck, others = [], []
     for i in single:
         who, off = i.hits[0][0], i.v[1] - i.due["v"]
@@ -118,11 +123,11 @@ def _restitutions(intervals: Sequence[Interval]) -> str:
 
 
 def _delay(interval: Interval, who: int) -> float:
-    """Return how late a slice leaves the end that it strikes [s], NaN if its speed is not the right one."""
+    """Return how late a slice leaves the end that it strikes [s], below 0 if early; NaN if its speed is off."""
     speed, off = interval.due["v"][who], interval.v[1] - interval.due["v"]
     place = interval.r[1][who] - interval.due["r"][who]
     right = abs(off[who]) < 0.05 * abs(speed) and abs(place) > 2 * abs(off[who]) * interval.throw.duration
-    return abs(place / speed) if right and np.max(np.abs(off)) < 0.05 * abs(speed) else float("nan")
+    return -place / speed if right and np.max(np.abs(off)) < 0.05 * abs(speed) else float("nan")
 
 
 def _of_angle(intervals: Sequence[Interval]) -> str:

@@ -148,13 +148,19 @@ def check_inputs(traits: Traits) -> Making:
     others["another start"] = replace(ask, start=stack)
     others["another start of the same mean"] = replace(ask, start=np.array([0.8, 0.7, 0.4, 0.2]) * bottle.length)
     others["other times"] = replace(ask, times=ask.times**2 / ask.times[-1])
+    others["another order of the start"] = replace(ask, start=SPREAD[::-1].copy())
     # The first throw comes again before each: whatever is kept of the last throw alone is kept of that one.
     asks = [question for other in others.values() for question in (ask, other)]
     answers = yield asks
+    # In another order the same slices turn the bottle alike.
+    looked_at = {"another order of the start": ("r",)}
     same = [
         words
         for words, original, changed in zip(others, answers[::2], answers[1::2], strict=True)
-        if all(np.array_equal(getattr(original, name), getattr(changed, name)) for name in ("theta", "omega"))
+        if all(
+            getattr(original, name) is not None and np.array_equal(getattr(original, name), getattr(changed, name))
+            for name in looked_at.get(words, ("theta", "omega"))
+        )
     ]
     return Found(
         holds=not same,
@@ -289,7 +295,9 @@ def _of_pace(pace: FloatArray) -> str:
 def check_angle(traits: Traits) -> Making:
     """theta is the integral of omega over time, also late in a long flight."""
     asks = _refined(traits, 961)
-    *answers, late = yield [*asks, ask_of(traits, SLOW, 0, 961)]
+    long = ask_of(traits, SLOW, 0, 961)
+    alone_ask = replace(ask_of(traits, SLOW, 2 if traits.refined_by else 0), times=long.times[-1:])
+    *answers, late, alone = yield [*asks, long, alone_ask]
     offs = []
     for a in (*answers, late):
         turned = np.cumsum(np.diff(a.t) * (a.omega[1:] + a.omega[:-1]) / 2)  # by the rule of trapezia
@@ -304,7 +312,17 @@ def check_angle(traits: Traits) -> Making:
     if not (holds or hint):
         hint = _lags(asks[0], answers[0])
     stops = holds and (slow > 100 * max(bound, sizes[0]) or late.theta[-1] == late.theta[-2])
+    given_up = abs(alone.theta[-1] - late.theta[-1]) > 0.2 * abs(late.theta[-1] - late.theta[0])
     halts = _own_times(late) if stops and np.any(np.diff(late.theta[: np.argmax(late.theta)]) == 0.0) else ""
+    if holds and not stops and given_up:
+        return Found(
+            holds=False,
+            expected="the same theta, whatever other times are asked",
+            came=f"theta = {alone.theta[-1]:.4g} rad instead of {late.theta[-1]:.4g} rad",
+            where=f"flight of {SLOW.duration:g} s, asked at its end alone instead of at 961 times",
+            advice="fly from one of ask.times to the next, however far apart they are: look for a largest number of "
+            "steps, or what is done once between two of them",
+        )
     return Found(
         holds=holds and not stops,
         expected=f"theta - theta_0 = integral of omega within {bound:.1g} rad, or a change that falls with dt",
@@ -366,10 +384,17 @@ def check_definitions(traits: Traits) -> Making:
         came=f"{worst} off by {off[worst].max():.2g}",
         where=when(answer.t, off[worst]),
         advice=_of_decimals(answer)
+        + _of_before(getattr(answer, worst), own[worst])
         + (_of_parts(answer) if worst == "inertia" else "")
         + "r_cm is the centre of mass of bottle and water from the cap, J that about it with the bottle's own: "
         "look at the masses, at the bottle's own inertia, and at where the answer is put together",
     )
+
+
+def _of_before(answered: FloatArray, right: FloatArray) -> str:
+    """Return that what is answered belongs to the output before, if it does."""
+    late = np.max(np.abs(answered[1:] - right[:-1])) < 1e-3 * np.ptp(right)
+    return "it is that of the output before: answer what belongs to r of the same instant; " if late else ""
 
 
 def _of_parts(answer: Answer) -> str:

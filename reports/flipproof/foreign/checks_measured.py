@@ -219,10 +219,6 @@ def check_order_across(traits: Traits) -> Making:
         where=f"{throws[0].n_slices} to {throws[-1].n_slices} slices, 0.3 s with impacts on both ends, steps of 5 ms "
         "and its halves",
         advice="rebounds answered at the next step give order 1; an order near 0 means that refinement does not help",
-        weak=f"impacts cost its order, {declared:g} before them, and hide mistakes in them: answer each at its own time, "
-        "and fly on from there to the end of the step"
-        if order < min(declared, 2.0) - 0.5 and errors[-1] > LOCATED
-        else "",
         facts={"order_across_impacts": order},
     )
 

@@ -196,17 +196,17 @@ Where the tube recoils, rounding decides whether a solver answers these hits tog
 
 SMALL: Final = replace(
     PAPER,
-    mass=3e-4,
-    length=0.012,
-    radius=0.004,
-    capacity=6e-4,
+    mass=1e-4,
+    length=0.008,
+    radius=0.003,
+    capacity=2e-4,
     filling=0.3,
     slices=9,
     start="permuted",
     omega0=-40.0,
     gravity=2.0,
 )
-"""A bottle of 12 mm with slices of 0.4 mm: a length, mass or drag coefficient that is cut off shows here."""
+"""A bottle of 8 mm with slices of 0.3 mm: a length, mass or drag coefficient that is cut off shows here."""
 
 SLOW: Final = replace(PAPER, slices=5, start="scattered", omega0=0.45, gravity=0.005, damping=0.05, angle=6.0)
 """A bottle that turns once in 14 s: a spin, an acceleration or a duration that is cut off shows here."""
@@ -214,8 +214,8 @@ SLOW: Final = replace(PAPER, slices=5, start="scattered", omega0=0.45, gravity=0
 SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
     {
         SMALL: (
-            replace(SMALL, mass=2.4, length=0.24, radius=0.08, capacity=4.8, gravity=40.0),
-            "right in a bottle of 0.24 m, wrong in one of 12 mm that moves in proportion",
+            replace(SMALL, mass=2.7, length=0.24, radius=0.09, capacity=5.4, gravity=60.0),
+            "right in a bottle of 0.24 m, wrong in one of 8 mm that moves in proportion",
             "m, kg, kg/s or m/s, such as a least height, room, mass, drag or speed",
         ),
         SLOW: (
