@@ -153,13 +153,13 @@ def check_inputs(traits: Traits) -> Making:
     asks = [question for other in others.values() for question in (ask, other)]
     answers = yield asks
     # In another order the same slices turn the bottle alike.
-    looked_at = {"another order of the start": ("r",)}
+    fields = dict.fromkeys(others, ("theta", "omega")) | {"another order of the start": ("r",)}
     same = [
         words
-        for words, original, changed in zip(others, answers[::2], answers[1::2], strict=True)
+        for (words, names), original, changed in zip(fields.items(), answers[::2], answers[1::2], strict=True)
         if all(
             getattr(original, name) is not None and np.array_equal(getattr(original, name), getattr(changed, name))
-            for name in looked_at.get(words, ("theta", "omega"))
+            for name in names
         )
     ]
     return Found(

@@ -138,11 +138,8 @@ def departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> Departing:
             if level == LEVELS[-1]:
                 raise
             continue
-        if not coarse and (came := _passed_over(intervals)):
-            return (
-                came,
-                "the slice that strikes still goes on: an answer between two steps must know of an impact on its way",
-            )
+        if coarse and (came := _passed_over(coarse, intervals)):
+            return came, "the slice goes on as before it: an answer between two steps must know of an impact on its way"
         if coarse and (astray := _astray(traits, intervals, coarse)).sum() < FEW:
             return _spoiled(traits, coarse, intervals)
         coarse = intervals
@@ -212,15 +209,21 @@ def _spoiled(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval
     )
 
 
-def _passed_over(intervals: Sequence[Interval]) -> str:
-    """Return where a slice still moves towards the end that it struck well before the output."""
-    lone = [
-        i
-        for before, i in pairwise(intervals)
-        if len(i.hits) == 1 and not before.hits and 0.05 < i.hits[0][2] / i.throw.duration < 0.95 and not i.before.any()
-    ]
-    over = sum(i.v[1][i.hits[0][0]] * i.due["v"][i.hits[0][0]] < 0.0 for i in lone)
-    return f"in {over} of {len(lone)} intervals with a single impact" if FEW <= over < len(lone) else ""
+def _passed_over(coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:
+    """Return how often a slice still moves towards the end that it struck well before, if seldom with short steps."""
+    counts = []
+    for intervals in (coarse, fine):
+        lone = [
+            i
+            for before, i in pairwise(intervals)
+            if len(i.hits) == 1
+            and not (before.hits or i.before.any())
+            and 0.05 < i.hits[0][2] / i.throw.duration < 0.95
+        ]
+        counts.append(sum(i.v[1][i.hits[0][0]] * i.due["v"][i.hits[0][0]] < 0.0 for i in lone))
+    if counts[0] < FEW or counts[1] > counts[0] / 2:
+        return ""
+    return f"after {counts[0]} impacts that come alone, and after {counts[1]} at a quarter of the step"
 
 
 def _lone(intervals: Sequence[Interval]) -> list[Interval]:
