@@ -129,19 +129,24 @@ def departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> Departing:
         astray = _astray(traits, intervals, None)
         return _told(equation, intervals, astray) if astray.sum() >= FEW else ("", "")
     coarse: list[Interval] = []
+    spoiled = ("", "")
     for level in LEVELS:
         try:
             intervals = yield from _flown(traits, equation, asks, level)
         except ForeignError:
             if coarse:  # too slow for so fine steps
-                return "", ""
+                return spoiled
             if level == LEVELS[-1]:
                 raise
             continue
-        if coarse and (came := _passed_over(coarse, intervals)):
-            return came, "the slice goes on as before it: an answer between two steps must know of an impact on its way"
-        if coarse and (astray := _astray(traits, intervals, coarse)).sum() < FEW:
-            return _spoiled(traits, coarse, intervals)
+        if coarse:
+            if came := _passed_over(coarse, intervals):
+                words = "the slice goes on as before it: an answer between two steps must know of an impact on its way"
+                return came, words
+            spoiled = max(spoiled, _spoiled(traits, coarse, intervals))
+            astray = _astray(traits, intervals, coarse)
+            if astray.sum() < FEW:
+                return spoiled
         coarse = intervals
     return _told(equation, intervals, astray)
 
