@@ -228,7 +228,7 @@ def _passed_over(coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:
         counts.append(sum(i.v[1][i.hits[0][0]] * i.due["v"][i.hits[0][0]] < 0.0 for i in lone))
     if counts[0] < FEW or counts[1] > counts[0] / 2:
         return ""
-    return f"after {counts[0]} impacts that come alone, and after {counts[1]} at a quarter of the step"
+    return f"after {counts[0]} impacts with none shortly before, and after {counts[1]} at a quarter of the step"
 
 
 def _lone(intervals: Sequence[Interval]) -> list[Interval]:
