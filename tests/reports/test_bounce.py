@@ -10,7 +10,7 @@ from made_up import alive, wait_for
 
 from flipproof.bounce import exact
 from flipproof.bounce.adapter import Adapter, AdapterError
-from flipproof.bounce.passport import MEASURES, OF_LINES, passport
+from flipproof.bounce.passport import LINE_MEASURES, MEASURES, passport
 from flipproof.bounce.specs import load
 
 
@@ -241,7 +241,7 @@ def in_line(masses, positions, velocities, restitution, dt, duration):
 
 def test_bodies_in_line():
     for name in ("pairs", "three in line"):
-        assert OF_LINES[name](Adapter("line", located, in_line), 1e-3).remark == ""
+        assert LINE_MEASURES[name](Adapter("line", located, in_line), 1e-3).remark == ""
 
     def without_masses(masses, *asked):
         return in_line([1.0] * len(masses), *asked)
@@ -255,7 +255,7 @@ def test_bodies_in_line():
         return t, x, v + 1e-3 * (t[:, None] > 0.06) * (velocities[-1] < 0)
 
     for line, name in ((without_masses, "pairs"), (together, "three in line"), (leaning, "one instant")):
-        assert OF_LINES[name](Adapter("line", located, line), 1e-3).remark
+        assert LINE_MEASURES[name](Adapter("line", located, line), 1e-3).remark
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "mujoco"])

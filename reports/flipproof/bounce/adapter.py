@@ -1,4 +1,4 @@
-"""What an engine's author writes: one function that drops a body, and, if the engine has bodies that meet, a second.
+"""What an engine's author writes: a function that drops a body and, if the engine lets bodies meet, a second.
 
     def drop(height, speed, restitution, gravity, dt, duration):
         ...                     # y = height above the floor [m], speed upward [m/s], gravity downward [m/s^2]
@@ -10,7 +10,7 @@
 
 An adapter is named as a solver is: file.py:name, package.module:name, or cmd:'program {height} {speed} {restitution}
 {gravity} {dt} {duration}', which prints the columns t,y,v as CSV. The name stands for ``drop`` itself, or for a module,
-class or object that has it, with ``line`` if it likes and ``settings``, a mapping to be printed.
+class or object that has it, optionally with ``line`` and ``settings``, a mapping to be printed.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ Line = Callable[
 ]
 
 BUILT_IN: Final = ("pymunk", "mujoco", "box2d")
-"""Adapters that are here already (``flipproof.bounce.engines``)."""
+"""Adapters that come with flipproof (``flipproof.bounce.engines``)."""
 
-PLACES: Final = ("height", "speed", "restitution", "gravity", "dt", "duration")
-"""What the words of a command may name in braces."""
+PARAMETERS: Final = ("height", "speed", "restitution", "gravity", "dt", "duration")
+"""What a command may name in braces."""
 
 TIMEOUT: Final = 20.0
 """Seconds that a command may take for one flight."""
 
 
 class AdapterError(ValueError):
-    """An adapter cannot be loaded, or its answer is no flight; the message says in one line what came."""
+    """An adapter cannot be loaded, or its answer is no flight; the message says in one line what is wrong."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Adapter:
     Parameters
     ----------
     name : str
-    settings : mapping - what the engine says of its settings, printed as it is
+    settings : mapping - the settings that the engine reports, printed as they are
     """
 
     name: str
@@ -69,10 +69,10 @@ class Adapter:
         Raises
         ------
         AdapterError
-            If the adapter raises anything, or they are no flight of the duration asked.
+            If the adapter raises anything, or returns no flight of that duration.
         """
         arguments = map(float, (height, speed, restitution, gravity, dt, duration))
-        answer = _answer(self.ask_drop, dict(zip(PLACES, arguments, strict=True)))
+        answer = _answer(self.ask_drop, dict(zip(PARAMETERS, arguments, strict=True)))
         t, y, v = _arrays(answer, ("t", "y", "v"), (1, 1, 1))
         _check_times(t, dt, duration)
         return t, y, v
@@ -115,8 +115,10 @@ def _answer(call: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
             for name, value in arguments.items()
         )
         place = traceback.extract_tb(error.__traceback__)[-1]
-        words = shortened(f"{type(error).__name__}: {error}", 200)
-        raise AdapterError(f"({question}) raised {words} ({Path(place.filename).name}, line {place.lineno})") from error
+        message = shortened(f"{type(error).__name__}: {error}", 200)
+        raise AdapterError(
+            f"({question}) raised {message} ({Path(place.filename).name}, line {place.lineno})"
+        ) from error
 
 
 def _arrays(answer: Any, names: Sequence[str], dimensions: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -124,8 +126,8 @@ def _arrays(answer: Any, names: Sequence[str], dimensions: Sequence[int]) -> tup
     if not isinstance(answer, Sequence) or len(answer) != 3:
         raise AdapterError(f"the answer is no triple of {', '.join(names)}")
     arrays = []
-    for name, part, dimension in zip(names, answer, dimensions, strict=True):
-        array = _numbers(name, part)
+    for name, values, dimension in zip(names, answer, dimensions, strict=True):
+        array = _numbers(name, values)
         if array.ndim != dimension or len(array) != len(_numbers(names[0], answer[0])):
             raise AdapterError(f"{name} has shape {array.shape}; t has {len(answer[0])} entries")
         if not np.isfinite(array).all():
@@ -136,9 +138,9 @@ def _arrays(answer: Any, names: Sequence[str], dimensions: Sequence[int]) -> tup
     return arrays[0], arrays[1], arrays[2]
 
 
-def _numbers(name: str, part: ArrayLike) -> FloatArray:
+def _numbers(name: str, values: ArrayLike) -> FloatArray:
     try:
-        return np.asarray(part, dtype=float)
+        return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
         raise AdapterError(f"{name} is no array of numbers") from None
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from flipproof.bounce.adapter import Adapter, AdapterError, FloatArray
 
-SIZE: Final = 0.1
+RADIUS: Final = 0.1
 """Radius of the falling ball [m]; the adapters subtract it."""
 
 Answer = tuple[FloatArray, FloatArray, FloatArray]
@@ -18,22 +18,22 @@ Answer = tuple[FloatArray, FloatArray, FloatArray]
 
 def adapter(name: str) -> Adapter:
     """Return a built-in adapter; an AdapterError says which package is missing."""
-    make = {"pymunk": _pymunk, "mujoco": _mujoco, "box2d": _box2d}[name]
+    build = {"pymunk": _pymunk, "mujoco": _mujoco, "box2d": _box2d}[name]
     try:
-        return make()
+        return build()
     except ModuleNotFoundError as error:
         raise AdapterError(f"{name}: the package {error.name} is not installed") from None
 
 
-def _stepped(steps: int, dt: float, state: Callable[[], Any], step: Callable[[], Any]) -> Answer:
+def _trajectory(steps: int, dt: float, state: Callable[[], Any], step: Callable[[], Any]) -> Answer:
     """Return times, positions and velocities at release and after each step."""
     rows = [state()]
     for _ in range(steps):
         step()
         rows.append(state())
-    places, speeds = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+    positions, velocities = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
     times: FloatArray = dt * np.arange(steps + 1, dtype=np.float64)
-    return times, places, speeds
+    return times, positions, velocities
 
 
 def _pymunk() -> Adapter:
@@ -44,11 +44,11 @@ def _pymunk() -> Adapter:
         space.gravity, space.iterations, space.collision_slop = (0.0, -gravity), 60, 0.0
         return space
 
-    def ball(space: Any, mass: float, place: tuple[float, float], velocity: tuple[float, float], e: float) -> Any:
+    def ball(space: Any, mass: float, position: tuple[float, float], velocity: tuple[float, float], e: float) -> Any:
         body = pymunk.Body(mass, math.inf)
-        shape = pymunk.Circle(body, SIZE)
+        shape = pymunk.Circle(body, RADIUS)
         shape.elasticity, shape.friction = e, 0.0
-        body.position, body.velocity = place, velocity
+        body.position, body.velocity = position, velocity
         space.add(body, shape)
         return body
 
@@ -57,9 +57,9 @@ def _pymunk() -> Adapter:
         floor = pymunk.Poly(space.static_body, [(-50, -50), (50, -50), (50, 0), (-50, 0)])
         floor.elasticity, floor.friction = 1.0, 0.0  # the engine multiplies the two
         space.add(floor)
-        body = ball(space, 1.0, (0.0, height + SIZE), (0.0, speed), restitution)
-        return _stepped(
-            round(duration / dt), dt, lambda: (body.position.y - SIZE, body.velocity.y), lambda: space.step(dt)
+        body = ball(space, 1.0, (0.0, height + RADIUS), (0.0, speed), restitution)
+        return _trajectory(
+            round(duration / dt), dt, lambda: (body.position.y - RADIUS, body.velocity.y), lambda: space.step(dt)
         )
 
     def line(
@@ -72,14 +72,14 @@ def _pymunk() -> Adapter:
     ) -> Answer:
         space = space_of(0.0)
         bodies = [
-            ball(space, m, (x + 2 * SIZE * k, 0.0), (u, 0.0), math.sqrt(restitution))
+            ball(space, m, (x + 2 * RADIUS * k, 0.0), (u, 0.0), math.sqrt(restitution))
             for k, (m, x, u) in enumerate(zip(masses, positions, velocities, strict=True))
         ]
-        return _stepped(
+        return _trajectory(
             round(duration / dt),
             dt,
             lambda: (
-                [body.position.x - 2 * SIZE * k for k, body in enumerate(bodies)],
+                [body.position.x - 2 * RADIUS * k for k, body in enumerate(bodies)],
                 [body.velocity.x for body in bodies],
             ),
             lambda: space.step(dt),
@@ -102,15 +102,15 @@ def _box2d() -> Adapter:
             Box2D.b2FixtureDef(shape=Box2D.b2PolygonShape(box=(50, 50)), friction=0, restitution=0)
         )  # the engine takes the larger of the two
         body = world.CreateDynamicBody(
-            position=(0, height + SIZE), linearVelocity=(0, speed), fixedRotation=True, bullet=True
+            position=(0, height + RADIUS), linearVelocity=(0, speed), fixedRotation=True, bullet=True
         )
         body.CreateFixture(
-            Box2D.b2FixtureDef(shape=Box2D.b2CircleShape(radius=SIZE), density=1, friction=0, restitution=restitution)
+            Box2D.b2FixtureDef(shape=Box2D.b2CircleShape(radius=RADIUS), density=1, friction=0, restitution=restitution)
         )
-        return _stepped(
+        return _trajectory(
             round(duration / dt),
             dt,
-            lambda: (body.position[1] - SIZE, body.linearVelocity[1]),
+            lambda: (body.position[1] - RADIUS, body.linearVelocity[1]),
             lambda: world.Step(dt, iterations, iterations),
         )
 
@@ -129,7 +129,7 @@ def _box2d() -> Adapter:
 def _mujoco() -> Adapter:
     import mujoco
 
-    stiffness = 1e5  # of the contact [1/s^2], of which the damping for e follows
+    stiffness = 1e5  # of the contact [1/s^2]; the damping for e follows from it
 
     def contact(restitution: float) -> str:
         bounces = restitution > 0
@@ -137,16 +137,16 @@ def _mujoco() -> Adapter:
         return f'solref="-{stiffness!r} -{2 * ratio * stiffness**0.5!r}" solimp="0.99 0.99 0.001" condim="1"'
 
     def drop(height: float, speed: float, restitution: float, gravity: float, dt: float, duration: float) -> Answer:
-        soft = contact(restitution)
+        contact_xml = contact(restitution)
         model = mujoco.MjModel.from_xml_string(
             f'<mujoco><option timestep="{dt!r}" gravity="0 0 {-gravity!r}" integrator="implicitfast"/><worldbody>'
-            f'<geom type="plane" size="5 5 1" {soft}/>'
-            f'<body pos="0 0 {height + SIZE!r}"><joint type="slide" axis="0 0 1"/>'
-            f'<geom type="sphere" size="{SIZE}" mass="1" {soft}/></body></worldbody></mujoco>'
+            f'<geom type="plane" size="5 5 1" {contact_xml}/>'
+            f'<body pos="0 0 {height + RADIUS!r}"><joint type="slide" axis="0 0 1"/>'
+            f'<geom type="sphere" size="{RADIUS}" mass="1" {contact_xml}/></body></worldbody></mujoco>'
         )
         data = mujoco.MjData(model)
         data.qvel[0] = speed
-        return _stepped(
+        return _trajectory(
             round(duration / dt), dt, lambda: (height + data.qpos[0], data.qvel[0]), lambda: mujoco.mj_step(model, data)
         )
 

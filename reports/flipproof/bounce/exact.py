@@ -34,7 +34,7 @@ def dropped(
 
 
 def _time_to_floor(h: float, u: float, gravity: float) -> float:
-    """Return when a body at height h with upward speed u reaches the floor; never is infinity."""
+    """Return when a body at height h with upward speed u reaches the floor; infinity if never."""
     if gravity == 0:
         return h / -u if u < 0 else math.inf
     return (u + math.sqrt(u * u + 2 * gravity * h)) / gravity
@@ -46,7 +46,7 @@ def rest_time(height: float, restitution: float, gravity: float) -> float:
 
 
 def line_velocities(masses: Sequence[float], velocities: Sequence[float], restitution: float) -> FloatArray:
-    """Return the velocities of two bodies after they met [m/s], from momentum and e alone."""
+    """Return the velocities of two bodies after they meet [m/s], from momentum and e alone."""
     (m, n), (u, w) = masses, velocities
     common = (m * u + n * w) / (m + n)
     return np.array([common - n * restitution * (u - w) / (m + n), common + m * restitution * (u - w) / (m + n)])

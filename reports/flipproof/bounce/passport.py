@@ -18,14 +18,14 @@ SPEEDS: Final = tuple(float(v) for v in np.geomspace(0.02, 10.0, 12))
 
 RESTITUTIONS: Final = (0.0, 0.25, 0.5, 0.8, 1.0)
 PHASES: Final = (0.1, 0.35, 0.6, 0.85)
-"""Parts of a step between the hit and the step before it."""
+"""Fractions of a step from the previous step to the hit."""
 
 STEPS: Final = (4.0, 2.0, 1.0, 0.5)
 """Steps of the studies of energy and order, in units of the passport's step."""
 
 GRAVITY: Final = 9.81
 REMARKED_ERROR: Final = 2e-3
-"""Difference of a restitution from the one asked that is remarked."""
+"""Error of a restitution from which on it is remarked."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +89,9 @@ def measure(adapter: Adapter, dt: float = 1e-3) -> Iterator[Measurement]:
     """
     if not 1e-5 <= dt <= 1e-2:
         raise ValueError(f"dt = {dt!r} s is outside [1e-05, 0.01]")
-    for name, measured in (MEASURES if adapter.ask_line is None else MEASURES | OF_LINES).items():
+    for name, function in (MEASURES if adapter.ask_line is None else MEASURES | LINE_MEASURES).items():
         try:
-            yield measured(adapter, dt)
+            yield function(adapter, dt)
         except AdapterError as error:
             raise AdapterError(f"{adapter.name}: {name}: {error}") from None
 
@@ -103,27 +103,29 @@ def passport(adapter: Adapter, dt: float = 1e-3) -> Passport:
 
 def contract(adapter: Adapter, dt: float) -> Measurement:
     """Whether a flight begins as asked, v is the rate of y, and the same question gets the same answer."""
-    height, speed, seconds = 1.0, 2.0, 0.2
-    t, y, v = adapter.drop(height, speed, 0.5, GRAVITY, dt, seconds)
-    again = adapter.drop(height, speed, 0.5, GRAVITY, dt, seconds)
-    reached, rate = exact.dropped(height, speed, 0.5, GRAVITY, t)
-    slack = 4 * GRAVITY * dt * (1 + seconds) + 1e-4
+    height, speed, duration = 1.0, 2.0, 0.2
+    t, y, v = adapter.drop(height, speed, 0.5, GRAVITY, dt, duration)
+    repeat = adapter.drop(height, speed, 0.5, GRAVITY, dt, duration)
+    exact_y, exact_v = exact.dropped(height, speed, 0.5, GRAVITY, t)
+    allowed = 4 * GRAVITY * dt * (1 + duration) + 1e-4
     remarks = []
     if not abs(t[0]) <= 1e-3 * dt:
         remarks.append(f"t begins at {t[0]:.6g} s, not at 0, the release")
-    if not abs(y[0] - reached[0]) <= slack * max(dt, t[0]) + 1e-5:
-        remarks.append(f"y begins at {y[0]:.6g} m where {reached[0]:.6g} m was asked")
-    if not abs(v[0] - rate[0]) <= slack:
-        remarks.append(f"v begins at {v[0]:.6g} m/s where {rate[0]:.6g} m/s was asked")
-    slope = float(np.abs(np.diff(y) / np.diff(t) - (v[1:] + v[:-1]) / 2).max())
-    if not slope <= slack:
-        remarks.append(f"v is not the rate of y: they differ by up to {slope:.2g} m/s")
-    same = all(np.array_equal(a, b) for a, b in zip((t, y, v), again, strict=True))
+    if not abs(y[0] - exact_y[0]) <= allowed * max(dt, t[0]) + 1e-5:
+        remarks.append(f"y begins at {y[0]:.6g} m where {exact_y[0]:.6g} m was asked")
+    if not abs(v[0] - exact_v[0]) <= allowed:
+        remarks.append(f"v begins at {v[0]:.6g} m/s where {exact_v[0]:.6g} m/s was asked")
+    rate_error = float(np.abs(np.diff(y) / np.diff(t) - (v[1:] + v[:-1]) / 2).max())
+    if not rate_error <= allowed:
+        remarks.append(f"v is not the rate of y: they differ by up to {rate_error:.2g} m/s")
+    same = all(np.array_equal(a, b) for a, b in zip((t, y, v), repeat, strict=True))
     if not same:
         remarks.append("the same question gets another answer")
-    sentence = f"v is the rate of y within {slope:.1e} m/s; the same question gets "
+    sentence = f"v is the rate of y within {rate_error:.1e} m/s; the same question gets "
     sentence += "the same answer to the last bit" if same else "another answer"
-    return Measurement("contract", sentence, "; ".join(remarks), {"deterministic": same, "largest_rate_error": slope})
+    return Measurement(
+        "contract", sentence, "; ".join(remarks), {"deterministic": same, "largest_rate_error": rate_error}
+    )
 
 
 def free_fall(adapter: Adapter, dt: float) -> Measurement:
@@ -131,27 +133,27 @@ def free_fall(adapter: Adapter, dt: float) -> Measurement:
     errors: dict[str, list[float]] = {}
     remarks = []
     for gravity in (GRAVITY, 3.7, 0.0):
-        rows = []
+        step_errors = []
         for step in STEPS:
             t, y, v = adapter.drop(3.0, 1.5, 0.5, gravity, step * dt, 0.5)
-            reached, _ = exact.dropped(3.0, 1.5, 0.5, gravity, t)
-            rows.append(float(abs(y[-1] - reached[-1])))
-        errors[f"{gravity:g}"] = rows
-        acts = float((v[0] - v[-1]) / (t[-1] - t[0]))
-        if not abs(acts - gravity) <= 1e-3 * max(gravity, 1.0):
-            remarks.append(f"gravity acts with {acts:.5g} m/s^2 where {gravity:g} was asked")
+            exact_y, _ = exact.dropped(3.0, 1.5, 0.5, gravity, t)
+            step_errors.append(float(abs(y[-1] - exact_y[-1])))
+        errors[f"{gravity:g}"] = step_errors
+        measured_gravity = float((v[0] - v[-1]) / (t[-1] - t[0]))
+        if not abs(measured_gravity - gravity) <= 1e-3 * max(gravity, 1.0):
+            remarks.append(f"gravity acts with {measured_gravity:.5g} m/s^2 where {gravity:g} was asked")
     worst = max(errors.values(), key=max)
     slope = convergence(worst)
     return Measurement(
         "free fall",
-        f"height after 0.5 s is off by {worst[2]:.1e} m at a step of {dt:g} s ({_of_order(slope)})",
+        f"height after 0.5 s is off by {worst[2]:.1e} m at a step of {dt:g} s ({_order_text(slope)})",
         "; ".join(remarks),
         {"errors_m": errors, "steps_s": [step * dt for step in STEPS]},
     )
 
 
 def ratio(adapter: Adapter, speed: float, restitution: float, dt: float, phase: float) -> float:
-    """Return speed after over speed before an impact without gravity; negative where a body still goes down."""
+    """Return the ratio of speeds after and before an impact without gravity; negative if the body still goes down."""
     _, _, v = adapter.drop(speed * (0.05 + phase * dt), -speed, restitution, 0.0, dt, 0.2)
     return float(v[-1] / speed)
 
@@ -165,24 +167,24 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
     errors, bounces, sinks = np.abs(table - nominal), table > nominal / 2, table < -REMARKED_ERROR
     remarks = []
     if sinks.any():
-        e, slowest = RESTITUTIONS[int(np.argmax(sinks.any((1, 2))))], SPEEDS[int(np.argmax(sinks.any((0, 2))))]
-        remarks.append(f"a body of {slowest:.2g} m/s with e = {e:g} still goes down 0.15 s after its hit")
-    dead = [v for k, v in enumerate(SPEEDS) if not bounces[2:, k].any()]
-    fast = [v for k, v in enumerate(SPEEDS) if bounces[2:, k].all()]
+        e, speed = RESTITUTIONS[int(np.argmax(sinks.any((1, 2))))], SPEEDS[int(np.argmax(sinks.any((0, 2))))]
+        remarks.append(f"a body of {speed:.2g} m/s with e = {e:g} still goes down 0.15 s after its hit")
+    dead_speeds = [v for k, v in enumerate(SPEEDS) if not bounces[2:, k].any()]
+    live_speeds = [v for k, v in enumerate(SPEEDS) if bounces[2:, k].all()]
     threshold = math.nan
     counted = np.ones(errors.shape[:2], dtype=bool)
-    if dead and max(fast, default=0.0) > max(dead):
-        slow, threshold = (_threshold(adapter, e, dt) for e in (0.5, 0.8))
-        # Some engines drop impacts that are slow, others rebounds that would be.
-        of_rebound = abs(0.5 * slow / (0.8 * threshold) - 1) < abs(slow / threshold - 1)
+    if dead_speeds and max(live_speeds, default=0.0) > max(dead_speeds):
+        slower, threshold = (_threshold(adapter, e, dt) for e in (0.5, 0.8))
+        # Some engines drop slow impacts, others slow rebounds.
+        of_rebound = abs(0.5 * slower / (0.8 * threshold) - 1) < abs(slower / threshold - 1)
         threshold *= 0.8 if of_rebound else 1.0
         remarks.append(f"{'no rebound is slower than' if of_rebound else 'nothing rebounds below'} {threshold:.3g} m/s")
         counted = np.multiply.outer(RESTITUTIONS if of_rebound else np.ones(len(RESTITUTIONS)), SPEEDS) > threshold
-    elif dead:
-        remarks.append(f"nothing rebounds at {', '.join(f'{v:.2g}' for v in dead)} m/s")
-    seen = np.where(sinks, 0.0, errors * counted[..., None])
-    k, s, p = (int(index) for index in np.unravel_index(int(np.argmax(seen)), seen.shape))
-    worst = float(seen[k, s, p])
+    elif dead_speeds:
+        remarks.append(f"nothing rebounds at {', '.join(f'{v:.2g}' for v in dead_speeds)} m/s")
+    relevant_errors = np.where(sinks, 0.0, errors * counted[..., None])
+    k, s, p = (int(index) for index in np.unravel_index(int(np.argmax(relevant_errors)), relevant_errors.shape))
+    worst = float(relevant_errors[k, s, p])
     if not worst <= REMARKED_ERROR:
         remarks.append(
             f"restitution is off by up to {worst:.2g} (asked {RESTITUTIONS[k]:g}, got {table[k, s, p]:.4g} at "
@@ -209,7 +211,7 @@ def restitution(adapter: Adapter, dt: float) -> Measurement:
 
 
 def _threshold(adapter: Adapter, restitution: float, dt: float) -> float:
-    """Return the speed of impact from which on a body rebounds, to 1 %."""
+    """Return the lowest speed of impact at which a body rebounds, to 1 %."""
     low, high = SPEEDS[0], SPEEDS[-1]
     while high > 1.01 * low:
         middle = math.sqrt(low * high)
@@ -221,50 +223,50 @@ def _threshold(adapter: Adapter, restitution: float, dt: float) -> float:
 
 
 def time_of_hit(adapter: Adapter, dt: float) -> Measurement:
-    """When a body is returned: read off the straight flight after an elastic hit, at two speeds."""
-    read = _returns(adapter, dt)
-    if read is None:
+    """When a body is returned: from the straight flight after an elastic hit, at two speeds."""
+    returns = _return_delays(adapter, dt)
+    if returns is None:
         return Measurement("time of hit", "an elastic hit was not returned", "an elastic hit was not returned")
-    shift, delay, fast = read
+    shift, delay, fast = returns
     spread = float(np.ptp(fast) / dt)
     remarks = []
     if not abs(shift) <= max(1e-4, dt):
         remarks.append(f"the floor lies {abs(shift) * 1e3:.2g} mm too {'high' if shift > 0 else 'low'}")
     if not abs(delay) <= 1.5 * dt + 1e-5:
-        shorter = _returns(adapter, dt / 4)
+        shorter = _return_delays(adapter, dt / 4)
         if shorter and shorter[1] > 0.7 * delay > 0.0:
             remarks.append(f"a contact takes {delay * 1e3:.2g} ms, also at a quarter of the step: it is soft")
         else:
             remarks.append(f"a body is returned {abs(delay) / dt:.2g} steps too {'late' if delay > 0 else 'early'}")
     if spread < 0.02:
-        where = "hits are located inside a step"
+        location = "hits are located inside a step"
     elif 0.7 < spread < 2.2:
-        where = f"hits are located on the grid of steps: returns spread over {spread:.2g} steps"
+        location = f"hits are located on the grid of steps: returns spread over {spread:.2g} steps"
     else:
-        where = f"the time of return changes with the phase of the step by {spread:.2g} steps"
+        location = f"the time of return changes with the phase of the step by {spread:.2g} steps"
     return Measurement(
         "time of hit",
-        f"{where}; a body is returned {fast.mean() / dt:.2g} steps late on average, at 8 m/s",
+        f"{location}; a body is returned {fast.mean() / dt:.2g} steps late on average, at 8 m/s",
         "; ".join(remarks),
         {"spread_steps": spread, "mean_steps": float(fast.mean() / dt), "floor_m": shift},
     )
 
 
-def _returns(adapter: Adapter, dt: float) -> tuple[float, float, FloatArray] | None:
+def _return_delays(adapter: Adapter, dt: float) -> tuple[float, float, FloatArray] | None:
     """Return how high the floor lies [m], how late a body is returned [s], and by how much at 8 m/s, (16,) [s].
 
     None if an elastic hit is not returned.
     """
     delays = {}
     for speed in (2.0, 8.0):
-        rows = []
+        speed_delays = []
         for phase in np.arange(16) / 16 + 1 / 37:
             height = speed * (0.05 + phase * dt)
             t, y, v = adapter.drop(height, -speed, 1.0, 0.0, dt, 0.2)
             if v[-1] <= 0:
                 return None
-            rows.append(float(t[-1] - y[-1] / v[-1] - height / speed))
-        delays[speed] = np.array(rows)
+            speed_delays.append(float(t[-1] - y[-1] / v[-1] - height / speed))
+        delays[speed] = np.array(speed_delays)
     slow, fast = delays[2.0], delays[8.0]
     # A floor that lies higher by s returns a body earlier by 2 s / speed; a delay is the same for both.
     shift = float((fast.mean() - slow.mean()) / (1 / 2.0 - 1 / 8.0) / 2)
@@ -272,13 +274,13 @@ def _returns(adapter: Adapter, dt: float) -> tuple[float, float, FloatArray] | N
 
 
 def energy(adapter: Adapter, dt: float) -> Measurement:
-    """Energy after twenty elastic bounces from one metre, over energy before, at four steps."""
-    seconds = 20 * 2 * math.sqrt(2 / GRAVITY)
-    kept = []
+    """Ratio of the energies after and before twenty elastic bounces from one metre, at four steps."""
+    duration = 20 * 2 * math.sqrt(2 / GRAVITY)
+    ratios = []
     for step in STEPS:
-        _, y, v = adapter.drop(1.0, 0.0, 1.0, GRAVITY, step * dt, seconds)
-        kept.append(float(y[-1] + v[-1] ** 2 / (2 * GRAVITY)))
-    low, high = min(kept), max(kept)
+        _, y, v = adapter.drop(1.0, 0.0, 1.0, GRAVITY, step * dt, duration)
+        ratios.append(float(y[-1] + v[-1] ** 2 / (2 * GRAVITY)))
+    low, high = min(ratios), max(ratios)
     remark = ""
     if not max(abs(low - 1), abs(high - 1)) <= 0.01:
         remark = f"twenty elastic bounces leave {low:.4g} to {high:.4g} of the energy"
@@ -288,7 +290,7 @@ def energy(adapter: Adapter, dt: float) -> Measurement:
         f"twenty elastic bounces leave {low:.4f} to {high:.4f} of the energy, at steps from {STEPS[-1] * dt:g} to "
         f"{STEPS[0] * dt:g} s",
         remark,
-        {"kept": kept, "steps_s": [step * dt for step in STEPS]},
+        {"kept": ratios, "steps_s": [step * dt for step in STEPS]},
     )
 
 
@@ -296,11 +298,11 @@ def order(adapter: Adapter, dt: float) -> Measurement:
     """Order of the error across several impacts: e = 0.7, 1.2 s, root mean square over sixteen heights."""
     errors = []
     for step in STEPS:
-        rows = []
+        step_errors = []
         for height in np.linspace(0.9, 1.1, 16):
             t, y, _ = adapter.drop(float(height), 0.0, 0.7, GRAVITY, step * dt, 1.2)
-            rows.append(y[-1] - exact.dropped(float(height), 0.0, 0.7, GRAVITY, t)[0][-1])
-        errors.append(float(np.sqrt(np.mean(np.square(rows)))))
+            step_errors.append(y[-1] - exact.dropped(float(height), 0.0, 0.7, GRAVITY, t)[0][-1])
+        errors.append(float(np.sqrt(np.mean(np.square(step_errors)))))
     slope = convergence(errors)
     remark = ""
     if not (slope >= 0.5 or errors[-1] <= 1e-5):
@@ -310,7 +312,7 @@ def order(adapter: Adapter, dt: float) -> Measurement:
             remark += "; it is not the step's, but that of the contact or of the floor's place"
     return Measurement(
         "order",
-        f"1.2 s of a fall from 1 m with e = 0.7 end {errors[2]:.1e} m off at a step of {dt:g} s ({_of_order(slope)} "
+        f"1.2 s of a fall from 1 m with e = 0.7 end {errors[2]:.1e} m off at a step of {dt:g} s ({_order_text(slope)} "
         "across impacts)",
         remark,
         {"errors_m": errors, "steps_s": [step * dt for step in STEPS], "order": slope},
@@ -324,54 +326,54 @@ def convergence(errors: list[float]) -> float:
     return observed_order(STEPS, np.maximum(errors, 1e-300), floor=0.0)[0]
 
 
-def _of_order(slope: float) -> str:
+def _order_text(slope: float) -> str:
     return "rounding alone" if math.isinf(slope) else f"order {slope:.1f}"
 
 
 def rest(adapter: Adapter, dt: float) -> Measurement:
     """Whether a body comes to rest: e = 0.5 from 0.1 m, where the exact impacts end after 0.43 s."""
-    over = exact.rest_time(0.1, 0.5, GRAVITY)
-    t, y, v = adapter.drop(0.1, 0.0, 0.5, GRAVITY, dt, over + 1.0)
-    tail = t > over + 0.5
+    t_rest = exact.rest_time(0.1, 0.5, GRAVITY)
+    t, y, v = adapter.drop(0.1, 0.0, 0.5, GRAVITY, dt, t_rest + 1.0)
+    tail = t > t_rest + 0.5
     low, high, speed = float(y[tail].min()), float(y[tail].max()), float(np.abs(v[tail]).max())
     remarks = []
     if not high - low <= 1e-3:
-        moves = "hops" if v[tail].max() > 1e-3 > -1e-3 > v[tail].min() else "sinks" if y[-1] < y[tail][0] else "rises"
-        remarks.append(f"half a second after its last exact impact the body still {moves} {(high - low) * 1e3:.2g} mm")
+        motion = "hops" if v[tail].max() > 1e-3 > -1e-3 > v[tail].min() else "sinks" if y[-1] < y[tail][0] else "rises"
+        remarks.append(f"half a second after its last exact impact the body still {motion} {(high - low) * 1e3:.2g} mm")
     elif not abs(low) <= 1e-3:
         remarks.append(f"it rests {abs(low) * 1e3:.2g} mm {'above' if low > 0 else 'below'} the floor")
     _, y, _ = adapter.drop(0.2, 0.0, 0.0, GRAVITY, dt, 0.6)
-    later = y[len(y) // 2 :]
-    after = float((later - np.minimum.accumulate(later)).max())
-    if not after <= 1e-3:
-        remarks.append(f"with e = 0 it rebounds by {after * 1e3:.2g} mm")
+    second_half = y[len(y) // 2 :]
+    rebound = float((second_half - np.minimum.accumulate(second_half)).max())
+    if not rebound <= 1e-3:
+        remarks.append(f"with e = 0 it rebounds by {rebound * 1e3:.2g} mm")
     return Measurement(
         "rest",
         f"at rest it lies {low * 1e3:.2g} to {high * 1e3:.2g} mm above the floor, at {speed:.1e} m/s or less",
         "; ".join(remarks),
-        {"lowest_m": low, "highest_m": high, "speed_m_s": speed, "rebound_of_e0_m": after},
+        {"lowest_m": low, "highest_m": high, "speed_m_s": speed, "rebound_of_e0_m": rebound},
     )
 
 
 def penetration(adapter: Adapter, dt: float) -> Measurement:
     """How far a body of 10 m/s goes below the floor."""
     lowest = min(float(adapter.drop(10.0 * (0.05 + phase * dt), -10.0, 0.5, 0.0, dt, 0.1)[1].min()) for phase in PHASES)
-    deep = max(-lowest, 0.0)
+    depth = max(-lowest, 0.0)
     remark = ""
-    if not deep <= 10.0 * dt * 1.01 + 1e-6:
-        remark = f"it goes {deep * 1e3:.2g} mm below the floor; in a step it flies {1e4 * dt:.2g} mm"
+    if not depth <= 10.0 * dt * 1.01 + 1e-6:
+        remark = f"it goes {depth * 1e3:.2g} mm below the floor; in a step it flies {1e4 * dt:.2g} mm"
     return Measurement(
-        "penetration", f"at 10 m/s it goes {deep * 1e3:.2g} mm below the floor", remark, {"depth_m": deep}
+        "penetration", f"at 10 m/s it goes {depth * 1e3:.2g} mm below the floor", remark, {"depth_m": depth}
     )
 
 
 def precision(adapter: Adapter, dt: float) -> Measurement:
-    """Whether the answers are numbers of float32, or fewer digits."""
+    """Whether the answers are float32 numbers, or have fewer digits."""
     _, y, v = adapter.drop(1.0, 0.3, 0.7, GRAVITY, dt, 0.8)
     numbers: FloatArray = np.concatenate([y[1:], v[1:]])
     with np.errstate(over="ignore"):
         half = bool(np.array_equal(numbers, numbers.astype(np.float16)))
-    # Adapters subtract the size of a body in float64, so v alone tells; and begin with the numbers that were asked.
+    # Adapters subtract the radius in float64, so only v shows it; and they begin with the numbers they were given.
     single = bool(np.array_equal(v[1:], v[1:].astype(np.float32)))
     bits = 16 if half else 32 if single else 64
     remark = "the answers are numbers of float16" if half else ""
@@ -380,15 +382,15 @@ def precision(adapter: Adapter, dt: float) -> Measurement:
 
 def pairs(adapter: Adapter, dt: float) -> Measurement:
     """Two bodies of 1 : 1000 and 1 : 1, elastic and not, against momentum and e."""
-    worst, words = 0.0, ""
+    worst, case = 0.0, ""
     for masses in ((1.0, 1.0), (1.0, 1000.0), (1000.0, 1.0)):
         for e in (0.0, 0.5, 1.0):
-            start = (1.0, 0.0)
-            _, _, v = adapter.line(masses, (0.0, 0.05 + 0.3 * dt), start, e, dt, 0.12)
-            error = float(np.abs(v[-1] - exact.line_velocities(masses, start, e)).max())
+            velocities = (1.0, 0.0)
+            _, _, v = adapter.line(masses, (0.0, 0.05 + 0.3 * dt), velocities, e, dt, 0.12)
+            error = float(np.abs(v[-1] - exact.line_velocities(masses, velocities, e)).max())
             if error > worst:
-                worst, words = error, f"masses {masses[0]:g} : {masses[1]:g}, e = {e:g}"
-    remark = "" if worst <= REMARKED_ERROR else f"velocities after a pair's impact are off by {worst:.2g} m/s ({words})"
+                worst, case = error, f"masses {masses[0]:g} : {masses[1]:g}, e = {e:g}"
+    remark = "" if worst <= REMARKED_ERROR else f"velocities after a pair's impact are off by {worst:.2g} m/s ({case})"
     return Measurement(
         "pairs", f"velocities after a pair's impact at 1 m/s are off by {worst:.1e} m/s at most", remark,
         {"largest_difference_m_s": worst},
@@ -396,13 +398,13 @@ def pairs(adapter: Adapter, dt: float) -> Measurement:
 
 
 def three_in_line(adapter: Adapter, dt: float) -> Measurement:
-    """Three equal bodies, two of them a thousandth of a step's way apart: the last alone flies on, as in a cradle."""
+    """Three equal bodies, two of them 1/1000 of a step's travel apart: only the last flies on, as in a cradle."""
     gap = 1e-3 * dt
     _, _, v = adapter.line((1.0, 1.0, 1.0), (0.0, 0.05, 0.05 + gap), (1.0, 0.0, 0.0), 1.0, dt, 0.12)
     error = float(np.abs(v[-1] - (0.0, 0.0, 1.0)).max())
-    shown = ", ".join(f"{u:.3f}" for u in v[-1])
-    remark = "" if error <= REMARKED_ERROR else f"of a cradle of three all move on, with {shown} m/s (exact: 0, 0, 1)"
-    return Measurement("three in line", f"a cradle of three ends with {shown} m/s", remark, {"velocities": list(v[-1])})
+    text = ", ".join(f"{u:.3f}" for u in v[-1])
+    remark = "" if error <= REMARKED_ERROR else f"of a cradle of three all move on, with {text} m/s (exact: 0, 0, 1)"
+    return Measurement("three in line", f"a cradle of three ends with {text} m/s", remark, {"velocities": list(v[-1])})
 
 
 def one_instant(adapter: Adapter, dt: float) -> Measurement:
@@ -431,5 +433,5 @@ MEASURES: Final[dict[str, Measure]] = {
 }
 """What is measured of every engine."""
 
-OF_LINES: Final[dict[str, Measure]] = {"pairs": pairs, "three in line": three_in_line, "one instant": one_instant}
-"""What is measured of an adapter that has ``line``, too."""
+LINE_MEASURES: Final[dict[str, Measure]] = {"pairs": pairs, "three in line": three_in_line, "one instant": one_instant}
+"""What is also measured of an adapter with ``line``."""

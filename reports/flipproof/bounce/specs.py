@@ -1,4 +1,4 @@
-"""What names an adapter on the command line: a known engine, a function of Python, or a program of any language."""
+"""Adapters by their names on the command line: a known engine, a Python function, or a program in any language."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import IO, Any
 import numpy as np
 
 from flipproof.bounce import engines
-from flipproof.bounce.adapter import BUILT_IN, PLACES, TIMEOUT, Adapter, AdapterError, Drop, FloatArray
+from flipproof.bounce.adapter import BUILT_IN, PARAMETERS, TIMEOUT, Adapter, AdapterError, Drop, FloatArray
 from flipproof.foreign.processes import KEPT, end, ending, half_of_memory, last_line, start
 from slicemodel.scenario import shortened, unknown_name
 
@@ -41,34 +41,34 @@ def load(spec: str) -> Adapter:
     from flipproof.foreign.specs import load as load_object
 
     try:
-        named: Any = load_object(spec)
+        target: Any = load_object(spec)
     except (ValueError, ImportError, AttributeError) as error:
         raise AdapterError(shortened(str(error), 300)) from None
-    if isinstance(named, type):
-        named = named()
-    drop = getattr(named, "drop", named)
+    if isinstance(target, type):
+        target = target()
+    drop = getattr(target, "drop", target)
     if not callable(drop):
         raise AdapterError(f"{spec} is no function and has no method drop")
-    return Adapter(spec, drop, getattr(named, "line", None), dict(getattr(named, "settings", {})))
+    return Adapter(spec, drop, getattr(target, "line", None), dict(getattr(target, "settings", {})))
 
 
-def _command(words: list[str], settings: dict[str, str]) -> Drop:
-    """Return what asks a program: one run a flight if it names places, else one program for all flights."""
-    for word in words:
+def _command(argv: list[str], settings: dict[str, str]) -> Drop:
+    """Return a ``drop`` that asks a program: one run per flight if it names parameters, else one for all flights."""
+    for word in argv:
         try:
-            word.format(**dict.fromkeys(PLACES, 0.0))
+            word.format(**dict.fromkeys(PARAMETERS, 0.0))
         except (KeyError, IndexError, ValueError):
-            raise AdapterError(f"cmd: {word!r} names something else than {', '.join(PLACES)} in braces") from None
-    answer = _once(words) if any("{" in word for word in words) else _kept(words)
+            raise AdapterError(f"cmd: {word!r} names something else than {', '.join(PARAMETERS)} in braces") from None
+    answer = _run_per_flight(argv) if any("{" in word for word in argv) else _persistent_program(argv)
 
     def drop(*numbers: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         lines = answer([repr(number) for number in numbers]).splitlines()  # repr: to the last digit
         while lines and lines[0].startswith("#"):
             name, _, value = lines.pop(0).lstrip("# ").partition(" = ")
             settings[name] = value
-        head = lines[0] if lines else ""
-        if head.replace(" ", "").strip() != "t,y,v":
-            raise AdapterError(f"cmd: the first line is {shortened(head, 60)!r}, not 't,y,v'")
+        header = lines[0] if lines else ""
+        if header.replace(" ", "").strip() != "t,y,v":
+            raise AdapterError(f"cmd: the first line is {shortened(header, 60)!r}, not 't,y,v'")
         if len(lines) == 1:
             raise AdapterError("cmd: nothing follows the first line")
         try:
@@ -82,31 +82,31 @@ def _command(words: list[str], settings: dict[str, str]) -> Drop:
     return drop
 
 
-def _once(words: list[str]) -> Callable[[list[str]], str]:
+def _run_per_flight(argv: list[str]) -> Callable[[list[str]], str]:
     def answer(numbers: list[str]) -> str:
-        given = dict(zip(PLACES, numbers, strict=True))
+        values = dict(zip(PARAMETERS, numbers, strict=True))
         with tempfile.TemporaryFile() as errors:
-            program = _start([word.format(**given) for word in words], subprocess.DEVNULL, errors)
+            program = _start([word.format(**values) for word in argv], subprocess.DEVNULL, errors)
             try:
-                printed, _ = program.communicate(timeout=TIMEOUT)
+                output, _ = program.communicate(timeout=TIMEOUT)
             except subprocess.TimeoutExpired:
                 raise AdapterError(f"cmd: no answer within {TIMEOUT:g} s") from None
             finally:
                 end(program)
             if program.returncode:
                 raise AdapterError(f"cmd: it {ending(program.returncode)}: {_last_line(errors)}")
-            return printed.decode(errors="replace")
+            return output.decode(errors="replace")
 
     return answer
 
 
-def _kept(words: list[str]) -> Callable[[list[str]], str]:
-    """Start a program that reads a flight a line and ends each answer with an empty line."""
+def _persistent_program(argv: list[str]) -> Callable[[list[str]], str]:
+    """Start a program that reads one flight per line and ends each answer with an empty line."""
     errors = tempfile.TemporaryFile()  # noqa: SIM115
-    program = _start(words, subprocess.PIPE, errors)
+    program = _start(argv, subprocess.PIPE, errors)
     assert isinstance(program.stdin, io.RawIOBase)
     assert isinstance(program.stdout, io.RawIOBase)
-    given, answers = program.stdin, io.TextIOWrapper(io.BufferedReader(program.stdout), errors="replace")
+    questions, answers = program.stdin, io.TextIOWrapper(io.BufferedReader(program.stdout), errors="replace")
     timed_out = threading.Event()
 
     def stop() -> None:
@@ -114,15 +114,15 @@ def _kept(words: list[str]) -> Callable[[list[str]], str]:
         end(program)
 
     def answer(numbers: list[str]) -> str:
-        clock, lines = threading.Timer(TIMEOUT, stop), []
-        clock.start()
+        timer, lines = threading.Timer(TIMEOUT, stop), []
+        timer.start()
         try:
-            with contextlib.suppress(BrokenPipeError):  # it has ended: what it said is still there
-                given.write(" ".join(numbers).encode() + b"\n")
+            with contextlib.suppress(BrokenPipeError):  # it has ended; its output can still be read
+                questions.write(" ".join(numbers).encode() + b"\n")
             while (line := answers.readline()).strip():
                 lines.append(line)
         finally:
-            clock.cancel()
+            timer.cancel()
         if line:
             return "".join(lines)
         last = "".join(lines[-1:]).strip()
@@ -137,15 +137,15 @@ def _kept(words: list[str]) -> Callable[[list[str]], str]:
             f"before an empty line: {_last_line(errors) or shortened(last, 200)!r}"
         )
 
-    weakref.finalize(answer, _close, program, given, answers, errors)
+    weakref.finalize(answer, _close, program, questions, answers, errors)
     return answer
 
 
-def _start(words: list[str], stdin: int, errors: IO[bytes]) -> subprocess.Popen[bytes]:
+def _start(argv: list[str], stdin: int, errors: IO[bytes]) -> subprocess.Popen[bytes]:
     try:
-        return start(words, half_of_memory(), stdin=stdin, stdout=subprocess.PIPE, stderr=errors)
+        return start(argv, half_of_memory(), stdin=stdin, stdout=subprocess.PIPE, stderr=errors)
     except OSError as error:
-        raise AdapterError(f"cmd: {words[0]} cannot be started ({error.strerror or error})") from None
+        raise AdapterError(f"cmd: {argv[0]} cannot be started ({error.strerror or error})") from None
 
 
 def _last_line(errors: IO[bytes]) -> str:

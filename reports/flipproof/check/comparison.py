@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flipproof.chapters.differences.study import PARTING_BAND
-from flipproof.curves.compare import beside
+from flipproof.curves.compare import on_common_times
 from flipproof.curves.growth import first_crossing
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.tables import QUANTITIES, Curve
@@ -98,7 +98,7 @@ def _apart(quantity: str, first: Curve, second: Curve) -> Apart:
     scale = float(values[0]) if quantity == "omega" else 1.0
     if scale == 0.0:
         raise ValueError(f"{first.label}: omega is 0 at the first time; differences are taken relative to it")
-    t, values, other_values, interpolated = beside(t, values, times, other_values)
+    t, values, other_values, interpolated = on_common_times(t, values, times, other_values)
     if len(t) < 2:
         raise ValueError(f"{first.label} has {len(t)} times within those of {second.label}; at least 2 are needed")
     return Apart(

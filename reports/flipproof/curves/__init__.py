@@ -1,1 +1,1 @@
-"""Curves in any columns, with jumps or without: how far apart they are, and until when they may be compared."""
+"""Curves of any columns, with or without jumps: how far apart they are, and for how long they can be compared."""

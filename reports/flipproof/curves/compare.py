@@ -1,7 +1,7 @@
-"""Two runs of anything, held against each other up to when their twins let them be.
+"""Two runs of anything, compared for as long as their twins allow.
 
-A twin of a run ought to be the same run: its release differs in a late digit, or its step or tolerance is coarser. What
-a twin changes the run does not know. Up to a time t the band of a comparison is
+A twin of a run ought to be the same run: its release differs in a late digit, or its step or tolerance is coarser.
+Whatever a twin changes is uncertain in the run. Up to a time t the band of a comparison is
 
     band(t) = SAFETY max over t' <= t of (max over twins of A |twin - A| + max over twins of B |twin - B|)
 
@@ -37,20 +37,20 @@ TOLERANCE: Final = 1e-3
 """Difference that is admissible unless another is asked for, in the unit of the column."""
 
 
-def beside(
+def on_common_times(
     t: FloatArray, values: FloatArray, times: FloatArray, other_values: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return common times, the first curve's values, the second's at these, and which are interpolated, (K,) each.
 
-    At an event a curve has a value before it and one after it, and each is compared with its like.
+    At an event a curve has one value before and one after it; like is compared with like.
     """
-    begins, ends = np.diff(t, prepend=-np.inf) > 0, np.diff(t, append=np.inf) > 0
-    kept = (begins | ends) & (t >= times[0]) & (t <= times[-1])
+    starts, ends = np.diff(t, prepend=-np.inf) > 0, np.diff(t, append=np.inf) > 0
+    kept = (starts | ends) & (t >= times[0]) & (t <= times[-1])
     t, values, after = t[kept], values[kept], ends[kept]
-    near = 1e-12 * max(abs(times[0]), abs(times[-1]))  # printing and reading a time explains so much
-    before, behind = np.searchsorted(times, t - near, "left"), np.searchsorted(times, t + near, "right") - 1
-    coincident = before <= behind
-    resampled = np.where(after, other_values[behind], other_values[np.minimum(before, len(times) - 1)])
+    tolerance = 1e-12 * max(abs(times[0]), abs(times[-1]))  # printing and reading a time may change it by this
+    low, high = np.searchsorted(times, t - tolerance, "left"), np.searchsorted(times, t + tolerance, "right") - 1
+    coincident = low <= high
+    resampled = np.where(after, other_values[high], other_values[np.minimum(low, len(times) - 1)])
     resampled[~coincident] = np.interp(t[~coincident], times, other_values)
     return t, values, resampled, ~coincident
 
@@ -59,11 +59,11 @@ def interpolation_error(t: FloatArray, values: FloatArray, at: FloatArray) -> Fl
     """Estimate the error of linear interpolation as h^2 / 8 max |y''| of the two ends of the interval."""
     h = np.diff(t)
     slope = np.divide(np.diff(values), h, out=np.zeros_like(h), where=h > 0.0)
-    bend = np.zeros(len(t))
-    bend[1:-1] = 2.0 * np.abs(np.diff(slope)) / np.maximum(t[2:] - t[:-2], np.finfo(float).tiny)
+    curvature = np.zeros(len(t))
+    curvature[1:-1] = 2.0 * np.abs(np.diff(slope)) / np.maximum(t[2:] - t[:-2], np.finfo(float).tiny)
     if len(t) > 2:
-        bend[0], bend[-1] = bend[1], bend[-2]
-    error = h**2 / 8.0 * np.maximum(bend[1:], bend[:-1])
+        curvature[0], curvature[-1] = curvature[1], curvature[-2]
+    error = h**2 / 8.0 * np.maximum(curvature[1:], curvature[:-1])
     return np.asarray(error[np.clip(np.searchsorted(t, at, "right") - 1, 0, len(h) - 1)])
 
 
@@ -89,7 +89,7 @@ def gap(first: Curves, second: Curves, column: str, *, shift: float, min_jump: f
     Raises ValueError if they share fewer than 2 times.
     """
     values, other_values = first.columns[column], second.columns[column]
-    t, left, right, interpolated = beside(first.t, values, second.t, other_values)
+    t, left, right, interpolated = on_common_times(first.t, values, second.t, other_values)
     if len(t) < 2:
         raise ValueError(
             f"{first.label} ({first.t[0]:g} to {first.t[-1]:g}) has {len(t)} times within those of {second.label} "
@@ -143,20 +143,20 @@ class Column:
     def worst(self) -> int | None:
         """Row of the largest ratio of the difference to what is admissible; None: no row can be compared."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            over = np.nan_to_num(self.gap.size / self.allowed, posinf=np.inf)
-        over[~self.comparable] = -1.0
-        return int(over.argmax()) if self.comparable.any() else None
+            ratio = np.nan_to_num(self.gap.size / self.allowed, posinf=np.inf)
+        ratio[~self.comparable] = -1.0
+        return int(ratio.argmax()) if self.comparable.any() else None
 
     @property
     def parted(self) -> float | None:
         """First time at which the difference is not admissible; None: never."""
-        apart = np.flatnonzero(self.comparable & (self.gap.size > self.allowed))
-        return float(self.gap.t[apart[0]]) if len(apart) else None
+        inadmissible = np.flatnonzero(self.comparable & (self.gap.size > self.allowed))
+        return float(self.gap.t[inadmissible[0]]) if len(inadmissible) else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """Two runs held against each other; ``events`` are those of both, ``notes`` what was left out."""
+    """A comparison of two runs; ``events`` are those of both, ``notes`` what was left out."""
 
     first: str
     second: str
@@ -181,7 +181,7 @@ class Comparison:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """One claim a column: its difference is admissible wherever it can be compared."""
+        """One claim per column: its difference is admissible wherever it can be compared."""
         findings = []
         for column in self.columns:
             id_, k = f"compare-{_slug(column.name)}", column.worst
@@ -202,12 +202,12 @@ class Comparison:
         lines = list(self.notes)
         for column in self.columns:
             gap, k = column.gap, int(column.gap.size.argmax())
-            words = f"{column.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.6g}"
+            text = f"{column.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.6g}"
             if gap.interpolated:
-                words += f" ({gap.interpolated} of {len(gap.t)} times interpolated)"
+                text += f" ({gap.interpolated} of {len(gap.t)} times interpolated)"
             if column.band.any():
-                words += f"; the twins' change {column.growth.words.replace('/s', 'per unit of time')}"
-            lines.append(words)
+                text += f"; the twins' change {column.growth.words.replace('/s', 'per unit of time')}"
+            lines.append(text)
             if column.last_digit is not None:
                 lines.append(
                     f"{column.name}: a change by one unit in the last place shows {column.tolerance:g} at "
@@ -262,12 +262,12 @@ def compare(
     tolerance: float | Mapping[str, float] | None = TOLERANCE,
     shift: float = 0.0,
 ) -> Comparison:
-    """Hold two runs against each other.
+    """Compare two runs.
 
     Parameters
     ----------
     twins, twins_of_second : runs that ought to be the first and the second
-    columns : what is compared; None: all columns that every run has
+    columns : those to compare; None: all columns that every run has
     tolerance : admissible difference in the unit of the column, or by column; None: the twins alone decide
     shift : by how much a jump may be early or late, beyond one step of the output and what the twins show
 
@@ -280,8 +280,8 @@ def compare(
     if tolerance is None and not twins and not twins_of_second:
         raise ValueError("the tolerance should come from twins, and there are none")
     for name in columns or ():
-        if (without := next((run.label for run in runs if name not in run.columns), None)) is not None:
-            raise ValueError(f"{without}: has no column {name!r}")
+        if (label := next((run.label for run in runs if name not in run.columns), None)) is not None:
+            raise ValueError(f"{label}: has no column {name!r}")
     shared = [name for name in columns or first.columns if all(name in run.columns for run in runs)]
     if not shared:
         raise ValueError(f"{' and '.join(run.label for run in runs)} have no column in common")
@@ -291,16 +291,16 @@ def compare(
         if columns is None and name not in shared
     ]
     if first.t[-1] != second.t[-1] or first.t[0] != second.t[0]:
-        common = max(first.t[0], second.t[0]), min(first.t[-1], second.t[-1])
-        notes.append(f"only t = {common[0]:.6g} to {common[1]:.6g} is common to both")
+        overlap = max(first.t[0], second.t[0]), min(first.t[-1], second.t[-1])
+        notes.append(f"only t = {overlap[0]:.6g} to {overlap[1]:.6g} is common to both")
     for run in (first, second):
-        again = np.diff(run.t) == 0.0
-        if between := np.count_nonzero(again[1:] & again[:-1]):
-            notes.append(f"{run.label}: {between} rows between the first and the last of one time are not compared")
+        repeated = np.diff(run.t) == 0.0
+        if n_between := np.count_nonzero(repeated[1:] & repeated[:-1]):
+            notes.append(f"{run.label}: {n_between} rows between the first and the last of one time are not compared")
     compared = []
     for name in shared:
-        allowed = 0.0 if tolerance is None else tolerance[name] if isinstance(tolerance, Mapping) else tolerance
-        compared.append(_column(name, first, second, twins, twins_of_second, allowed, shift))
+        admissible = 0.0 if tolerance is None else tolerance[name] if isinstance(tolerance, Mapping) else tolerance
+        compared.append(_column(name, first, second, twins, twins_of_second, admissible, shift))
     return Comparison(
         first=first.label,
         second=second.label,
@@ -316,43 +316,43 @@ def _column(
 ) -> Column:  # fmt: skip
     min_jump = tolerance or TOLERANCE * float(np.ptp(first.columns[name]))
     changes = []
-    for run, doubles in ((first, twins), (second, second_twins)):
-        gaps = [gap(run, twin, name, shift=np.inf, min_jump=min_jump) for twin in doubles]
+    for run, run_twins in ((first, twins), (second, second_twins)):
+        gaps = [gap(run, twin, name, shift=np.inf, min_jump=min_jump) for twin in run_twins]
         changes.append(gaps)
         shift += SAFETY * max((float(np.abs(g.matched.shift).max(initial=0.0)) for g in gaps), default=0.0)
-    between = gap(first, second, name, shift=shift, min_jump=min_jump)
-    change = sum((_widest(gaps, between.t) for gaps in changes), np.zeros(len(between.t)))
+    difference = gap(first, second, name, shift=shift, min_jump=min_jump)
+    change = sum((_largest_change(gaps, difference.t) for gaps in changes), np.zeros(len(difference.t)))
     band = SAFETY * np.maximum.accumulate(change)
     comparable = np.ones(len(band), bool) if not tolerance else band <= 0.5 * tolerance
-    beyond = np.flatnonzero(~comparable)
+    not_comparable = np.flatnonzero(~comparable)
     if tolerance:
-        comparable = comparable & (between.error <= 0.5 * tolerance)
-    seen = np.flatnonzero(change > 0.0)
-    crossing = first_crossing(between.t, np.where(np.isfinite(change), change, np.finfo(float).max), min_jump)
+        comparable = comparable & (difference.error <= 0.5 * tolerance)
+    nonzero = np.flatnonzero(change > 0.0)
+    crossing = first_crossing(difference.t, np.where(np.isfinite(change), change, np.finfo(float).max), min_jump)
     stop = math.inf if crossing is None else crossing
-    growth = fit_growth(between.t, change, stop=stop) if len(seen) else Growth()
+    growth = fit_growth(difference.t, change, stop=stop) if len(nonzero) else Growth()
     last_digit = None
     if len(changes[0]) == 1 and crossing is not None and growth.rate > 0.0 and growth.clear:
-        started = changes[0][0].size[0]
+        initial = changes[0][0].size[0]
         value = abs(float(first.columns[name][0]))
-        last = float(np.spacing(value))
-        if value > 0.0 and last < started < min_jump:
-            last_digit = crossing + (math.log(started) - math.log(last)) / growth.rate
+        ulp = float(np.spacing(value))
+        if value > 0.0 and ulp < initial < min_jump:
+            last_digit = crossing + (math.log(initial) - math.log(ulp)) / growth.rate
     return Column(
         name=name,
-        gap=between,
+        gap=difference,
         band=band,
         comparable=comparable,
         tolerance=tolerance,
-        horizon=float(between.t[beyond[0]]) if len(beyond) else None,
+        horizon=float(difference.t[not_comparable[0]]) if len(not_comparable) else None,
         growth=growth,
         last_digit=last_digit,
     )
 
 
-def _widest(changes: Sequence[Gap], t: FloatArray) -> FloatArray:
+def _largest_change(gaps: Sequence[Gap], t: FloatArray) -> FloatArray:
     """Return the largest change by a twin at the times ``t``; infinite where a twin does not exist."""
-    sizes = [np.interp(t, change.t, change.size, left=np.inf, right=np.inf) for change in changes]
+    sizes = [np.interp(t, gap.t, gap.size, left=np.inf, right=np.inf) for gap in gaps]
     return np.max(sizes, axis=0) if sizes else np.zeros(len(t))
 
 
@@ -360,8 +360,8 @@ def _events(first: Curves, second: Curves, columns: Sequence[Column], shift: flo
     """Match the events that both runs list, or else the jumps of all columns."""
     if first.t_events is not None and second.t_events is not None:
         step = max(float(np.median(np.diff(run.t))) for run in (first, second))
-        until = min(first.t[-1], second.t[-1])
-        times = [run.t_events[run.t_events <= until] for run in (first, second) if run.t_events is not None]
+        t_end = min(first.t[-1], second.t[-1])
+        times = [run.t_events[run.t_events <= t_end] for run in (first, second) if run.t_events is not None]
         return match(times[0], times[1], shift + step)
     return max((column.gap.matched for column in columns), key=lambda matched: len(matched.pairs) + len(matched.lone))
 

@@ -1,4 +1,4 @@
-"""Flights that ought to be one flight, and how far their omega(t) come apart.
+"""Flights that ought to be one flight, and how far their omega(t) diverge.
 
 The members of an ensemble differ in one small thing: a late digit of the release, a tolerance, the method, the engine.
 All differences are fractions of |omega_0|. Nothing is cut off where they become large.
@@ -22,7 +22,7 @@ from slicemodel.trajectory import FloatArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ensemble:
-    """Flights on the times of the first, which stands for all; the others are linear between their own times.
+    """Flights at the times of the first, which stands for all; the others are interpolated linearly.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Ensemble:
 
 
 def difference(first: Trajectory, second: Trajectory) -> tuple[FloatArray, FloatArray]:
-    """Return the times of the first flight that both have [s], and there (omega_second - omega_first) / omega_0.
+    """Return the first flight's times that both cover [s], and there (omega_second - omega_first) / omega_0.
 
     The second is linear between its own times.
     """
@@ -100,9 +100,9 @@ def largest_change(first: Trajectory, second: Trajectory) -> float:
 def claim_change(
     id_: str, title: str, first: Trajectory, second: Trajectory, band: float, *, differ: bool, note: str = ""
 ) -> Finding:
-    """Return the claim that two runs agree; a run compared with itself, or not whole, proves nothing.
+    """Return the claim that two runs agree; a run compared with itself, or incomplete, proves nothing.
 
-    Runs that do not ``differ`` in their settings, or one that is not whole, raise Missing.
+    Runs that do not ``differ`` in their settings, or an incomplete one, raise Missing.
     """
     if not differ:
         raise Missing("the two runs have the same settings: comparing them proves nothing")

@@ -12,10 +12,10 @@ from slicemodel.trajectory import FloatArray
 IndexArray = NDArray[np.int64]
 
 RATIO: Final = 6.0
-"""A change so many times as fast as those beside it is a jump."""
+"""A change this many times as fast as its neighbours is a jump."""
 
 MAX_EVENTS: Final = 2000
-"""Events of a run that are matched."""
+"""Number of events of a run that are matched."""
 
 
 def closest(first: FloatArray, second: FloatArray, in_first: IndexArray, in_second: IndexArray) -> IndexArray:
@@ -46,17 +46,17 @@ class Jumps(NamedTuple):
 
 
 def jumps(t: FloatArray, values: FloatArray, min_jump: float) -> Jumps:
-    """Return where a column jumps: twice given at one time, or changing ``RATIO`` times as fast as its neighbours do.
+    """Return where a column jumps: given twice at one time, or changing ``RATIO`` times as fast as its neighbours.
 
-    Smaller changes than ``min_jump`` are no jumps; nor is a peak of one row, which is two changes beside each other.
+    Changes below ``min_jump`` are not jumps, nor is a peak of one row, which is two adjacent changes.
     """
     h, change = np.diff(t), np.abs(np.diff(values))
-    usual = float(np.median(h[h > 0.0])) if (h > 0.0).any() else 0.0
+    median_step = float(np.median(h[h > 0.0])) if (h > 0.0).any() else 0.0
     rate = np.divide(change, h, out=np.zeros_like(h), where=h > 0.0)
     padded = np.pad(rate, 2)
-    beside = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)
-    mask = (change > min_jump) & ((h == 0.0) | ((rate > RATIO * beside) & (h > 0.0)))
-    return Jumps((t[:-1][mask] + t[1:][mask]) / 2.0, usual)
+    neighbours = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)
+    is_jump = (change > min_jump) & ((h == 0.0) | ((rate > RATIO * neighbours) & (h > 0.0)))
+    return Jumps((t[:-1][is_jump] + t[1:][is_jump]) / 2.0, median_step)
 
 
 class Matched(NamedTuple):
@@ -77,11 +77,11 @@ class Matched(NamedTuple):
         """Return how many events agree, and which one comes before the time at which the runs part."""
         if not len(self.pairs) and not len(self.lone):
             return []
-        words = f"events: {len(self.pairs)} in both"
+        text = f"events: {len(self.pairs)} in both"
         if len(self.pairs):
-            words += f", at most {np.abs(self.shift).max():.3g} apart"
+            text += f", at most {np.abs(self.shift).max():.3g} apart"
         counts = [int((self.lone[:, 1] == which).sum()) for which in (0, 1)]
-        lines = [f"{words}; {counts[0]} in the first alone, {counts[1]} in the second alone"]
+        lines = [f"{text}; {counts[0]} in the first alone, {counts[1]} in the second alone"]
         if parted is None:
             return lines
         earlier = [(time, f"that only the {('first', 'second')[int(which)]} run has") for time, which in self.lone]
@@ -99,10 +99,10 @@ class Matched(NamedTuple):
 
 
 def match(first: FloatArray, second: FloatArray, within: float) -> Matched:
-    """Match events in order, as many as lie ``within`` of each other; of each run the first ``MAX_EVENTS`` are seen."""
+    """Match events in order, as many as lie ``within`` of each other; only the first ``MAX_EVENTS`` of a run count."""
     first, second = first[:MAX_EVENTS], second[:MAX_EVENTS]
     j, k = closest(first, second, np.arange(len(first)), np.arange(len(second)))
-    near = np.abs(second[k] - first[j]) <= within
-    j, k = j[near], k[near]
+    close = np.abs(second[k] - first[j]) <= within
+    j, k = j[close], k[close]
     lone = [(time, 0.0) for time in np.delete(first, j)] + [(time, 1.0) for time in np.delete(second, k)]
     return Matched(np.stack([first[j], second[k]], axis=1), np.array(sorted(lone)).reshape(-1, 2))

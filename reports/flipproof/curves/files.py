@@ -1,4 +1,4 @@
-"""Curves of other people: CSV, Parquet, NPZ and NetCDF files, and objects of pandas and xarray, in any columns."""
+"""Curves from elsewhere: CSV, Parquet, NPZ and NetCDF files, and objects of pandas and xarray, with any columns."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Curves:
     Parameters
     ----------
     label : name for messages
-    t : (P,) - times, P >= 2; they do not decrease, and two values at one time are those before and after an event
+    t : (P,) - times, P >= 2, never decreasing; two values at one time are those before and after an event
     columns : (P,) each, finite
     t_events : times of the events, if they are known; None: jumps are looked for
     """
@@ -47,7 +47,7 @@ def curves(
 
     Parameters
     ----------
-    columns : names of those that are compared; None: all columns of real numbers as long as that of the time
+    columns : names of those to compare; None: all columns of real numbers as long as that of the time
     time : name of the column of times; None: the first of ``TIMES`` that is there
 
     Raises
@@ -69,36 +69,36 @@ def curves(
     t = _numbers(label, time, table[time])
     if len(t) < 2:
         raise ValueError(f"{label}: column {time!r} has {len(t)} rows; at least 2 are needed")
-    back = np.flatnonzero(np.diff(t) < 0.0)
-    if len(back):
-        k = int(back[0])
+    decreasing = np.flatnonzero(np.diff(t) < 0.0)
+    if len(decreasing):
+        k = int(decreasing[0])
         raise ValueError(
             f"{label}: row {k + 2}, column {time!r}: {t[k + 1]:g} follows {t[k]:g}; times must not decrease"
         )
     if columns is None:
         columns = [name for name in names if name not in (time, "t_events") and np.shape(table[name]) == t.shape]
-    read = {name: _numbers(label, name, table[name]) for name in columns}
-    for name, values in read.items():
+    arrays = {name: _numbers(label, name, table[name]) for name in columns}
+    for name, values in arrays.items():
         if len(values) != len(t):
             raise ValueError(f"{label}: column {name!r} has {len(values)} rows, {time!r} has {len(t)}")
-    if not read:
+    if not arrays:
         raise ValueError(f"{label}: has no column beside {time!r} to compare")
     events = None if t_events is None else np.sort(_numbers(label, "t_events", t_events))
-    return Curves(label, t, read, events)
+    return Curves(label, t, arrays, events)
 
 
 def _numbers(label: str, name: str, values: Any) -> FloatArray:
     """Return a column as floats; an empty cell, NaN, an infinity or a word raises ValueError with its row."""
-    given = np.asarray(values)
-    if given.ndim != 1 or given.dtype.kind == "c":
-        raise ValueError(f"{label}: column {name!r} is not one column of real numbers, but {given.dtype} {given.shape}")
+    array = np.asarray(values)
+    if array.ndim != 1 or array.dtype.kind == "c":
+        raise ValueError(f"{label}: column {name!r} is not one column of real numbers, but {array.dtype} {array.shape}")
     try:
-        numbers = np.asarray(given, dtype=np.float64)
+        numbers = np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError):
-        numbers = np.array([_number(label, name, row, value) for row, value in enumerate(given, start=1)])
-    wrong = np.flatnonzero(~np.isfinite(numbers))
-    if len(wrong):
-        raise ValueError(f"{label}: row {wrong[0] + 1}, column {name!r}: {numbers[wrong[0]]} is not finite")
+        numbers = np.array([_number(label, name, row, value) for row, value in enumerate(array, start=1)])
+    invalid = np.flatnonzero(~np.isfinite(numbers))
+    if len(invalid):
+        raise ValueError(f"{label}: row {invalid[0] + 1}, column {name!r}: {numbers[invalid[0]]} is not finite")
     return numbers
 
 

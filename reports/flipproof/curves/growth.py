@@ -20,7 +20,7 @@ class Growth(NamedTuple):
     def clear(self) -> bool:
         """True if the rate differs from zero by more than three standard errors.
 
-        With as few windows as are fitted, noise does so in 5 of 100 cases.
+        With as few windows as are fitted, noise alone does so in 5 of 100 cases.
         """
         return abs(self.rate) > 3.0 * self.error
 
@@ -37,7 +37,7 @@ class Growth(NamedTuple):
 def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: float = math.inf) -> Growth:
     """Fit |difference| = A exp(rate t) over [start, stop], robustly.
 
-    A difference changes sign and jumps, so single points and squares of residuals tell little. The interval is divided
+    A difference changes sign and jumps, so single points and least squares say little. The interval is divided
     into twelve windows with the median of log |difference| in each, and the rate is the median of the slopes between
     all pairs of them (Theil and Sen). Its standard error is that of a straight line whose scatter is the median
     absolute residual, scaled to a normal distribution. Points below round-off or not finite are left out.

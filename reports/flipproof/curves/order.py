@@ -1,6 +1,6 @@
 """The order at which errors fall with the step, across events.
 
-An event that waits for the grid makes the error of one run a matter of where in its step the event falls: single runs
+If events are handled on the grid only, the error of one run depends on where in its step the event falls: single runs
 scatter by more than a factor of two. Each step is therefore an ensemble of runs with other phases, whose mean square
 error has an order.
 """
@@ -24,9 +24,9 @@ def observed_order(step: ArrayLike, error: ArrayLike, floor: float = ROUND_OFF) 
 
     Parameters
     ----------
-    step, error : (K,) or (K, M) - of K levels, at M phases each
+    step, error : (K,) or (K, M) - K levels of M phases each
     """
-    step, error = (np.reshape(given, (len(np.asarray(given)), -1)) for given in (step, error))
+    step, error = (np.reshape(values, (len(np.asarray(values)), -1)) for values in (step, error))
     if len(step) < 3 or not np.all(np.isfinite(error)) or error.min() < floor:
         return math.nan, math.nan
     x = np.log(step).mean(axis=1)
