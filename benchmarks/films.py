@@ -25,8 +25,8 @@ import numpy as np
 from scipy.stats import beta
 
 from flipproof.film.estimate import estimate
-from flipproof.film.fall import before
-from flipproof.film.judge import Judged
+from flipproof.film.fall import hand_share
+from flipproof.film.judge import Assessment
 from flipproof.film.likelihood import Film, Held
 from slicemodel import Scenario
 
@@ -70,7 +70,7 @@ def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
             made = drawn(np.random.default_rng([index, k]), cell, slices)
             throw = Scenario(water_mass=cell["filling"]).with_slices(slices)
             try:
-                judged = Judged(estimate(film_of(made), throw))
+                judged = Assessment(estimate(film_of(made), throw))
                 judged.check()
             except ValueError as error:
                 refused += 1
@@ -107,7 +107,7 @@ def rough(spoiled: int, noise: int, slices: int) -> None:
         made = drawn(rng, {"fps": (30, 60)[k % 2], "noise": 1e-3, "tilt": 3.0}, slices)
         film = (film_simulator.spoiled if k < spoiled else film_simulator.noise)(rng, film_of(made))
         try:
-            judged = Judged(estimate(film, Scenario().with_slices(slices)))
+            judged = Assessment(estimate(film, Scenario().with_slices(slices)))
             judged.check()
             low, high = judged.estimate.interval("gamma", 0.999)
             sound = "explains" if judged.explained else "does not explain"
@@ -129,8 +129,8 @@ def widths(films: int, first: int, slices: int) -> None:
             made = drawn(np.random.default_rng([index, k]), cell, slices)
             film, throw = film_of(made), Scenario(water_mass=cell["filling"]).with_slices(slices)
             try:
-                alone = Judged(estimate(film, throw))
-                given = Judged(estimate(film, throw, held=Held(release=made.truth["release"])))
+                alone = Assessment(estimate(film, throw))
+                given = Assessment(estimate(film, throw, held=Held(release=made.truth["release"])))
                 alone.check()
             except ValueError as error:
                 print("   refused:", error, flush=True)
@@ -151,7 +151,7 @@ def releases(films: int) -> None:
             if cell["fps"] == fps:
                 made = drawn(np.random.default_rng([index, k]), cell, 6)
                 release, touch = made.truth["release"] + late / 1e3, made.truth["touch"]
-                hand = before(film_of(made), release, touch, cell["noise"])
+                hand = hand_share(film_of(made), release, touch, cell["noise"])
                 total, seen = total + 1, seen + bool(hand and hand.falls)
         print(f"{fps} fps, {late} ms late: {seen} of {total}")
 

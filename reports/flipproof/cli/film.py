@@ -94,7 +94,7 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def command_film(options: argparse.Namespace) -> int:
-    """Estimate what films tell, print it and write the folder; return 1 for a film that cannot be right."""
+    """Fit films, print the estimates and write the folder; return 1 for a film that cannot be right."""
     from flipproof.output.folder import check_replaceable, replaced_folder
     from flipproof.output.provenance import provenance
 
@@ -103,40 +103,40 @@ def command_film(options: argparse.Namespace) -> int:
     if len(set(options.model)) < len(options.model):
         raise ValueError(f"--model names {next(n for n in options.model if options.model.count(n) > 1)} twice")
     from flipproof.film import page
-    from flipproof.film.judge import Judged, UnsoundError, compared, ranked, together
+    from flipproof.film.judge import Assessment, UnsoundError, compared, ranked, shared_draws
 
     each_film = options.kind == "fit" and options.each
     if each_film and len(options.model) > 1:
         raise ValueError("--each fits one equation to several films; name one --model")
     scenario = read_scenario(options.scenario)
     groups = [(path,) for path in options.files] if each_film else [tuple(options.files)]
-    films: list[list[Judged]] = []
+    films: list[list[Assessment]] = []
     for paths in groups:
-        judgements = ranked([Judged(_estimate(options, paths, scenario, name)) for name in options.model])
+        assessments = ranked([Assessment(_estimate(options, paths, scenario, name)) for name in options.model])
         try:
-            judgements[0].check()
+            assessments[0].check()
         except UnsoundError as error:
             print(f"flipproof: {error}", file=sys.stderr)
             return 1
-        films.append(judgements)
+        films.append(assessments)
     lines: list[str] = []
-    for judgements in films:
-        film = judgements[0].estimate.film
+    for assessments in films:
+        film = assessments[0].estimate.film
         lines += [f"{film.label}: {len(film.t)} frames ({'; '.join(film.notes)})"]
-        for judgement in judgements:
-            lines += judgement.lines()
-        lines += [compared(judgements), ""]
+        for assessment in assessments:
+            lines += assessment.lines()
+        lines += [compared(assessments), ""]
     if each_film:
-        lines += _shared(*together([judgements[0] for judgements in films]))
+        lines += _shared_lines(*shared_draws([assessments[0] for assessments in films]))
     text = "\n".join(lines).rstrip()
     print(text)
     if options.out is not None:
         facts: Mapping[str, str] = provenance(command_line())
         with replaced_folder(options.out, options.kind) as folder:
-            for k, judgements in enumerate(films):
-                place = folder / f"film-{k + 1}" if each_film else folder
-                place.mkdir(exist_ok=True)
-                page.write(judgements, text, place, facts)
+            for k, assessments in enumerate(films):
+                film_folder = folder / f"film-{k + 1}" if each_film else folder
+                film_folder.mkdir(exist_ok=True)
+                page.write(assessments, text, film_folder, facts)
         print(f"written  {options.out / ('film-1/index.html' if each_film else 'index.html')}")
     return 0
 
@@ -172,12 +172,12 @@ def _counter(step: Callable[..., None]) -> Callable[[int], object]:
     return tick
 
 
-def _shared(draws: Mapping[str, Any], words: str) -> list[str]:
+def _shared_lines(draws: Mapping[str, Any], agreement: str) -> list[str]:
     import numpy as np
 
     from flipproof.film.estimate import UNITS, shortest
 
-    lines = [f"all films together: {words}"]
+    lines = [f"all films together: {agreement}"]
     for name, values in draws.items():
         low, high = shortest(values, 0.95)
         lines.append(f"  {name:12} {np.median(values):.3g} [{low:.3g}, {high:.3g}] {UNITS[name]}".rstrip())
@@ -198,8 +198,8 @@ def command_export(options: argparse.Namespace) -> int:
         print(f"flipproof: {options.solver}: {run.status}: {run.message}", file=sys.stderr)
     frames = at_times(run, times[times <= run.t[-1]])
     if options.height is not None:
-        frames, words = until_landing(run, frames, options.height)
-        print(f"flipproof: {words}", file=sys.stderr)
+        frames, landing = until_landing(run, frames, options.height)
+        print(f"flipproof: {landing}", file=sys.stderr)
     table = data_track_text(frames, start=options.start, origin=options.origin)
     if options.out:
         write_text(options.out, table)

@@ -1,7 +1,7 @@
 """From files to points: exports of the Tracker video tool, a track.csv, tables of theta or omega.
 
-A track.csv has one row for a frame, SI units and an empty cell for what is missing. Read are ``t``, ``cap_x``,
-``cap_y``, ``base_x``, ``base_y`` and, if it is there, ``line``; ``SCHEMA`` says what the other columns are.
+A track.csv has one row per frame, SI units and empty cells for missing values. Of its columns, ``t``, ``cap_x``,
+``cap_y``, ``base_x``, ``base_y`` and, if present, ``line`` are read; ``SCHEMA`` describes the others.
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ SCHEMA: Final = MappingProxyType(
 )
 """Columns of a track.csv and what they are."""
 
-PLACES: Final = ("cap_x", "cap_y", "base_x", "base_y")
+POINT_COLUMNS: Final = ("cap_x", "cap_y", "base_x", "base_y")
 
 MAX_FRAMES: Final = 20_000
-"""Frames of a record at the most: 80 s at 240 frames/s; a flip lasts half a second."""
+"""Largest number of frames of a record: 80 s at 240 frames/s; a flip lasts half a second."""
 
 MIN_VALUES: Final = 12
-"""Rows of a table of theta or omega at the least."""
+"""Fewest rows of a table of theta or omega."""
 
 SAME_TIME: Final = 1e-9
-"""Times that differ by no more [s] are one time."""
+"""Times that differ by no more than this [s] are the same."""
 
 
 def read_film(
@@ -65,25 +65,25 @@ def read_film(
     frame_rate: float | None = None,
     quantity: Quantity | None = None,
 ) -> Film:
-    """Return what files hold: with ``cap`` and ``base`` exports of one clip by Tracker, else one CSV table.
+    """Return the film in files: with ``cap`` and ``base`` exports of one clip by Tracker, else one CSV table.
 
     Parameters
     ----------
     cap, base : names of the tracks of an export
-    length_unit, time_unit : of an export; a unit of length in its headings does instead
-    frame_rate : at which an export was recorded [1/s], if its times are those of slow motion
+    length_unit, time_unit : of an export; its headings may state the unit of length instead
+    frame_rate : at which an export was recorded [1/s], if its times are in slow motion
     quantity : what to take from a table that has points, theta and omega; the first of these by default
 
     Raises
     ------
     ValueError
-        What cannot be read; the message names file, line, column and a way out.
+        If something cannot be read; the message names file, line, column and a way out.
     """
     if (cap is None) != (base is None):
         raise ValueError("--cap and --base name the two tracks of a Tracker export; give both or neither")
     if cap is not None and base is not None:
         table = read_track_table(*paths)
-        return _of_tracks(table, cap, base, _length_unit(table, cap, base, length_unit), time_unit, frame_rate)
+        return _from_tracks(table, cap, base, _length_unit(table, cap, base, length_unit), time_unit, frame_rate)
     if length_unit or frame_rate is not None:
         raise ValueError("--length-unit and --frame-rate are those of a Tracker export; give --cap and --base, too")
     if len(paths) > 1:
@@ -94,19 +94,19 @@ def read_film(
 def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     """Return the points of a track.csv, or theta or omega from the release of any CSV with t in seconds."""
     names, rows = read_cells(path)
-    able: dict[Quantity, tuple[str, ...]] = {"points": PLACES, "theta": ("theta",), "omega": ("omega",)}
-    there = [kind for kind, columns in able.items() if set(columns) <= set(names)]
-    has = f"; it has {shortened(', '.join(names), 80)}"
+    columns_of: dict[Quantity, tuple[str, ...]] = {"points": POINT_COLUMNS, "theta": ("theta",), "omega": ("omega",)}
+    available = [kind for kind, columns in columns_of.items() if set(columns) <= set(names)]
+    header_text = f"; it has {shortened(', '.join(names), 80)}"
     if "t" not in names:
-        raise ValueError(f"{path}: the header has no column t{has}")
-    if not there or (quantity and quantity not in there):
-        raise ValueError(f"{path}: the header has no column {quantity or 'theta or omega'}{has}")
-    chosen = quantity or there[0]
-    wanted = ("t", *able[chosen])
-    places = [names.index(name) for name in wanted]
+        raise ValueError(f"{path}: the header has no column t{header_text}")
+    if not available or (quantity and quantity not in available):
+        raise ValueError(f"{path}: the header has no column {quantity or 'theta or omega'}{header_text}")
+    chosen = quantity or available[0]
+    wanted = ("t", *columns_of[chosen])
+    indices = [names.index(name) for name in wanted]
     numbers = np.array(
         [[number_of(path, line, name, cells[k]) if cells[k].strip() else np.nan
-          for name, k in zip(wanted, places, strict=True)] for line, cells in rows]
+          for name, k in zip(wanted, indices, strict=True)] for line, cells in rows]
     ).reshape(-1, len(wanted))  # fmt: skip
     lines = np.array([line for line, _ in rows], dtype=np.int64)
     if "line" in names:
@@ -117,8 +117,8 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     if len(t) < MIN_VALUES:
         raise ValueError(f"{path}: {len(t)} rows have a time and a value; {MIN_VALUES} are needed")
     if (np.diff(t) <= SAME_TIME).any():
-        late = int(np.flatnonzero(np.diff(t) <= SAME_TIME)[0])
-        raise ValueError(f"{path}: t does not increase: {t[late + 1]:g} s follows {t[late]:g} s")
+        k = int(np.flatnonzero(np.diff(t) <= SAME_TIME)[0])
+        raise ValueError(f"{path}: t does not increase: {t[k + 1]:g} s follows {t[k]:g} s")
     if np.abs(numbers).max(initial=0.0, where=np.isfinite(numbers)) > 1e6:
         raise ValueError(f"{path}: holds a number beyond 1e6, which no film needs")
     if chosen == "points":
@@ -128,7 +128,7 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     return Film(label=path.name, t=t, values=numbers[None, :, 1:], quantity=chosen, lines=lines, notes=(note,))
 
 
-def _of_tracks(table: TrackTable, cap: str, base: str, unit: str, time_unit: str, frame_rate: float | None) -> Film:
+def _from_tracks(table: TrackTable, cap: str, base: str, unit: str, time_unit: str, frame_rate: float | None) -> Film:
     tracks = table.track(cap), table.track(base)
     if tracks[0] is tracks[1]:
         raise ValueError(f"cap and base are both {cap!r}; two tracks are needed")
@@ -136,7 +136,7 @@ def _of_tracks(table: TrackTable, cap: str, base: str, unit: str, time_unit: str
         raise ValueError(f"time_unit = {time_unit!r} is unknown; known: {', '.join(SECONDS)}")
     if frame_rate is not None and not 1 <= frame_rate <= 1e6:
         raise ValueError(f"frame_rate = {frame_rate:g} 1/s is outside [1, 1e6]")
-    frame_time, frames, how = frame_grid(table)
+    frame_time, frames, note = frame_grid(table)
     seconds = SECONDS[time_unit] if frame_rate is None else 1.0 / (frame_rate * frame_time)
     values = np.array([track.points() for track in tracks]) * METRES[unit]
     return Film(
@@ -145,7 +145,7 @@ def _of_tracks(table: TrackTable, cap: str, base: str, unit: str, time_unit: str
         values=values,
         quantity="points",
         lines=table.lines,
-        notes=(*table.dialects, how),
+        notes=(*table.dialects, note),
     )
 
 
@@ -158,9 +158,9 @@ def _length_unit(table: TrackTable, cap: str, base: str, requested: str) -> str:
         )
     unit = stated or requested
     if unit not in METRES:
-        what = f"length_unit = {unit!r} is unknown" if unit else "does not state the unit of x and y"
+        problem = f"length_unit = {unit!r} is unknown" if unit else "does not state the unit of x and y"
         raise TrackFileError(
-            f"{table.source}: {what}; name the one of the calibration stick: --length-unit {', '.join(METRES)}"
+            f"{table.source}: {problem}; name the one of the calibration stick: --length-unit {', '.join(METRES)}"
         )
     return unit
 
@@ -169,44 +169,44 @@ def frame_grid(table: TrackTable) -> tuple[float, NDArray[np.int64], str]:
     """Return the frame time, the frame number of every row, and how the times were read.
 
     Rows may be missing. The frame time is the slope of a straight line through the times over their frame numbers, so
-    that times printed with few digits do not spoil it. Steps that are no multiples of one frame time are refused: a
-    camera with variable frame rate.
+    that times printed with few digits do not spoil it. Steps that are not multiples of one frame time, as from a camera
+    with variable frame rate, are refused.
     """
     t = table.t
     if len(t) < 2:
         raise ValueError(f"{table.source}: has {len(t)} row; a motion needs more")
     steps = np.diff(t)
-    usual = float(np.median(steps))
-    # The mean of the single steps, because the median of times with few digits is one of two rounded values.
-    slope, start = float(steps[steps < 1.5 * usual].mean()), float(t[0])
+    median_step = float(np.median(steps))
+    # The mean of single steps: with few digits the median is one of two rounded values.
+    slope, start = float(steps[steps < 1.5 * median_step].mean()), float(t[0])
     frames = np.zeros(len(t), dtype=np.int64)
     for _ in range(2):
-        apart = np.rint(steps / slope)
-        if not apart.min() >= 1 or not apart.sum() < MAX_FRAMES:
-            k = int(np.argmax(np.abs(steps / usual - 1)))
+        frame_steps = np.rint(steps / slope)
+        if not frame_steps.min() >= 1 or not frame_steps.sum() < MAX_FRAMES:
+            k = int(np.argmax(np.abs(steps / median_step - 1)))
             raise ValueError(
                 f"{table.source}, line {table.lines[k + 1]}: the time steps from {t[k]:g} to {t[k + 1]:g} where "
-                f"{usual:g} is usual; export every frame of one clip, at most {MAX_FRAMES} frames"
+                f"{median_step:g} is usual; export every frame of one clip, at most {MAX_FRAMES} frames"
             )
-        frames[1:] = np.cumsum(apart)
+        frames[1:] = np.cumsum(frame_steps)
         slope, start = (float(value) for value in np.polyfit(frames, t, 1))
-    missed = np.abs(t - (start + slope * frames))
-    # E notation drops zeros of its own: what most times are rounded to, all may be. A time may miss its frame by what
-    # its digits leave open, up to a fifth of the frame time, and by a fiftieth of it whatever its digits.
-    printed = 1.1 * np.maximum(table.resolution, np.median(table.resolution))
-    excess = missed - np.maximum(np.minimum(printed, 0.2 * slope), 0.02 * slope)
+    errors = np.abs(t - (start + slope * frames))
+    # E notation drops trailing zeros: all times may be rounded as most are. A time may miss its frame by the rounding
+    # of its digits, up to a fifth of the frame time, and by a fiftieth of it whatever its digits.
+    rounding = 1.1 * np.maximum(table.resolution, np.median(table.resolution))
+    excess = errors - np.maximum(np.minimum(rounding, 0.2 * slope), 0.02 * slope)
     worst = int(excess.argmax())
     if excess[worst] > 0:
         raise ValueError(
             f"{table.source}, line {table.lines[worst]}: the time {t[worst]:g} misses its frame by "
-            f"{missed[worst] / slope:.0%} of the frame time {slope:g}; frames are uneven: record with a constant frame "
+            f"{errors[worst] / slope:.0%} of the frame time {slope:g}; frames are uneven: record with a constant frame "
             "rate, and export times with more digits"
         )
     return slope, frames, f"times are frame numbers times {slope:.7g}, the mean time between frames"
 
 
 def smoothed_rate(t: FloatArray, theta: FloatArray) -> FloatArray:
-    """Return omega as the paper makes it of an angle (section 3): central differences, then the mean of five points.
+    """Return omega from an angle as in the paper (section 3): central differences, then the mean of five points.
 
     NaN where one of them is missing.
     """
@@ -218,6 +218,6 @@ def smoothed_rate(t: FloatArray, theta: FloatArray) -> FloatArray:
     return mean
 
 
-def described(columns: Mapping[str, str] = SCHEMA) -> str:
+def schema_comments(columns: Mapping[str, str] = SCHEMA) -> str:
     """Return the schema as comment lines of a file."""
-    return "".join(f"# {name}: {words}\n" for name, words in columns.items() if words)
+    return "".join(f"# {name}: {text}\n" for name, text in columns.items() if text)

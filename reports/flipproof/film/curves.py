@@ -1,8 +1,8 @@
-"""What an equation says of a throw's turning, as curves over the angle it would turn as ice.
+"""How a throw turns by an equation, as curves over the angle it would turn as ice.
 
 Over s = |omega_0| t the curves F = |theta - theta_0|, F' = |omega / omega_0| and R = r_CM / L of an equation without
-weight depend on gamma / omega_0 and e alone, whatever omega_0 and theta_0 are: one flight serves every release. Of
-other equations two more flights give the linear change with omega_0 and theta_0 about a reference.
+weight depend on gamma / omega_0 and e alone, whatever omega_0 and theta_0 are: one flight serves every release. For
+other equations, more flights give the linear change with omega_0 and theta_0 about a reference.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
 SLICES: Final = 50
-"""Slices that a throw is cut into at the most, unless others are asked for."""
+"""Largest number of slices of a throw, unless another is requested."""
 
 STEP: Final = 0.025
-"""Spacing of the curves [rad of ice]; between them lie cubics of F and F'."""
+"""Spacing of the curves [rad of ice]; between rows, cubics of F and F' are used."""
 
-CHANGE: Final = 0.01
+DIFFERENCE: Final = 0.01
 """Relative change of omega_0, and change of theta_0 [rad], over which slopes of weighted equations are taken."""
 
-UNWEIGHTED: Final = np.empty((0, 3, 0))
+NO_SLOPES: Final = np.empty((0, 3, 0))
 """No slopes."""
 
-Flown = tuple[FloatArray, FloatArray, FloatArray]
+Flight = tuple[FloatArray, FloatArray, FloatArray]
 """theta, omega and r_CM of one flight."""
 
 
@@ -55,8 +55,8 @@ class Curve:
 
         Before s = 0 the water rests.
         """
-        moved = np.array([np.log(abs(omega0) / abs(self.omega0)), theta0 - self.theta0])
-        return np.asarray(curve_at(self.rows, UNWEIGHTED if self.slopes is None else self.slopes, STEP, moved, s))
+        offset = np.array([np.log(abs(omega0) / abs(self.omega0)), theta0 - self.theta0])
+        return np.asarray(curve_at(self.rows, NO_SLOPES if self.slopes is None else self.slopes, STEP, offset, s))
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,14 @@ class Equation:
     solver : str - a scheme of ``slicemodel``, a model of ``ode_reference`` or somebody else's
     throw : Scenario - bottle, water and gravity; its drag, restitution, omega0, theta0 and duration are not used
     reach : float - largest s [rad]
-    places : bool - whether r_CM is asked for
+    needs_r_cm : bool - whether the film needs r_CM
     tick : callable - called with the number of flights made
     """
 
     solver: str
     throw: Scenario
     reach: float
-    places: bool = True
+    needs_r_cm: bool = True
     tick: Callable[[int], object] = field(default=lambda _: None, compare=False)
 
     def __post_init__(self) -> None:
@@ -83,10 +83,10 @@ class Equation:
 
     @cached_property
     def weighted(self) -> bool:
-        """Whether weight makes a difference to the turning."""
+        """Whether weight affects the turning."""
         throw = self._throw(0.25, 0.5, 20.0, 1.0)
-        (with_weight,), (without,) = self._fly([throw]), self._fly([replace(throw, gravity=0.0)])
-        return not np.allclose(with_weight, without, rtol=0, atol=1e-9, equal_nan=True)
+        (with_weight,), (without_weight,) = self._fly([throw]), self._fly([replace(throw, gravity=0.0)])
+        return not np.allclose(with_weight, without_weight, rtol=0, atol=1e-9, equal_nan=True)
 
     def curves(self, nodes: FloatArray, omega0: float, theta0: float) -> list[Curve | None]:
         """Return the curve of every (gamma / |omega_0|, e) in ``nodes`` (K, 2); None where the solver gave up.
@@ -94,12 +94,12 @@ class Equation:
         ``omega0`` and ``theta0`` (in the lab) are where slopes of a weighted equation are taken.
         """
         if not self.weighted:
-            rows = self._fly([self._throw(g, e, 20.0, 1.0) for g, e in nodes])
+            rows = self._fly([self._throw(rate, e, 20.0, 1.0) for rate, e in nodes])
             return [Curve(row) if np.isfinite(row).all() else None for row in rows]
-        sides = ((0, 0), (CHANGE, 0), (-CHANGE, 0), (0, CHANGE), (0, -CHANGE))
-        throws = [self._throw(g, e, omega0 * np.exp(a), theta0 + b) for g, e in nodes for a, b in sides]
+        stencil = ((0, 0), (DIFFERENCE, 0), (-DIFFERENCE, 0), (0, DIFFERENCE), (0, -DIFFERENCE))
+        throws = [self._throw(rate, e, omega0 * np.exp(a), theta0 + b) for rate, e in nodes for a, b in stencil]
         flights = self._fly(throws).reshape(len(nodes), 5, 3, -1)
-        slopes = (flights[:, 1::2] - flights[:, 2::2]) / (2 * CHANGE)
+        slopes = (flights[:, 1::2] - flights[:, 2::2]) / (2 * DIFFERENCE)
         return [
             Curve(rows[0], slope, omega0, theta0) if np.isfinite(rows).all() else None
             for rows, slope in zip(flights, slopes, strict=True)
@@ -113,15 +113,15 @@ class Equation:
         """Return F, F' and R of throws (K, 3, S); NaN from where a solver gave up."""
         count = int(self.reach / STEP) + 1
         rows = np.full((len(throws), 3, count), np.nan)
-        for k, (throw, flown) in enumerate(zip(throws, self._flown(throws, count), strict=True)):
-            if flown is not None:
-                sign, size = np.sign(throw.omega0), len(flown[0])
-                turned, rate = (flown[0] - throw.theta0) * sign, flown[1] / throw.omega0
-                rows[k, :, :size] = turned, rate, flown[2] / throw.bottle.length
+        for k, (throw, flight) in enumerate(zip(throws, self._solve_all(throws, count), strict=True)):
+            if flight is not None:
+                sign, size = np.sign(throw.omega0), len(flight[0])
+                turned, rate = (flight[0] - throw.theta0) * sign, flight[1] / throw.omega0
+                rows[k, :, :size] = turned, rate, flight[2] / throw.bottle.length
         self.tick(len(throws))
         return rows
 
-    def _flown(self, throws: Sequence[Scenario], count: int) -> Sequence[Flown | None]:
+    def _solve_all(self, throws: Sequence[Scenario], count: int) -> Sequence[Flight | None]:
         """Return theta, omega and r_CM of each throw at its ``count`` values of s."""
         times = [np.minimum(np.arange(count) * STEP / abs(throw.omega0), throw.duration) for throw in throws]
         package = package_of(self.solver)
@@ -133,33 +133,35 @@ class Equation:
         if package == "slicemodel":
             from slicemodel.batch import solve_batch
 
-            flights: list[Flown] = []
+            flights: list[Flight] = []
             for throw, t in zip(throws, times, strict=True):
-                # The paper's own step, 1000 of them in half a second, and a whole number of them between two values.
-                fine = int(np.ceil(t[1] / 5e-4))
-                flight = solve_batch([replace(throw, duration=float(t[-1]))], self.solver, fine * (count - 1) + 1)
-                flights.append((flight.theta[0, ::fine], flight.omega[0, ::fine], flight.r_cm[0, ::fine]))
+                # The paper's own step, 1000 in half a second, and a whole number of steps between two values.
+                substeps = int(np.ceil(t[1] / 5e-4))
+                flight = solve_batch([replace(throw, duration=float(t[-1]))], self.solver, substeps * (count - 1) + 1)
+                flights.append((flight.theta[0, ::substeps], flight.omega[0, ::substeps], flight.r_cm[0, ::substeps]))
             return flights
         from flipproof.foreign.contract import ForeignError
 
-        flown: list[Flown | None] = [None] * len(throws)
+        results: list[Flight | None] = [None] * len(throws)
         for k, (throw, t) in enumerate(zip(throws, times, strict=True)):
             with suppress(ForeignError):
                 run = solve(self.solver, throw, times=t)
-                if self.places and "r_cm" in run.diagnostics.get("not_given", ()):
+                if self.needs_r_cm and "r_cm" in run.diagnostics.get("not_given", ()):
                     raise ValueError(f"model = {self.solver!r} gives no r_cm, which a film of cap and base needs")
-                flown[k] = run.theta, run.omega, run.r_cm
-        return flown
+                results[k] = run.theta, run.omega, run.r_cm
+        return results
 
 
 def package_of(solver: str) -> str:
-    """Return the package of a solver that can be fitted; an engine, a curve in a file, an unknown name are refused."""
+    """Return the package of a solver that can be fitted; engines, curves in files and unknown names are refused."""
     from flipproof.foreign.specs import check_asked
 
     package = find(solver).package
     if package == "engine_check":
-        able = [name for name, other in catalogue().items() if other.package != package]
-        raise ValueError(f"model = {solver!r} is a physics engine, too slow to fit with; choose from {', '.join(able)}")
+        others = [name for name, other in catalogue().items() if other.package != package]
+        raise ValueError(
+            f"model = {solver!r} is a physics engine, too slow to fit with; choose from {', '.join(others)}"
+        )
     if package in OTHERS:
         check_asked(solver)
     return package

@@ -1,10 +1,10 @@
-"""The one estimate that every command shares: from the points of a film to what was thrown, with what is not known.
+"""The one estimate that every command shares: from the points of a film to the throw, with its uncertainty.
 
-Given gamma / |omega_0| and e, one flight says how the bottle turns, and all else, the release among it, is fitted to
-the points by scoring. What the data allow of these others is a normal distribution to good accuracy (Laplace), so
-their integral is known at every pair; the pairs themselves, over which the likelihood has folds wherever a slice
-rebounds, are covered by a grid that closes in on all pairs that matter. The sum over its nodes is the posterior, and
-the evidence of the equation. There is no chance in it: equal data give equal answers.
+Given gamma / |omega_0| and e, one flight says how the bottle turns, and all else, including the release, is fitted to
+the points by scoring. The posterior of these others is normal to good accuracy (Laplace), so their integral is known at
+every pair; the pairs themselves, over which the likelihood has folds wherever a slice rebounds, are covered by a grid
+that closes in on all pairs that matter. The sum over its nodes is the posterior, and the evidence of the equation. It
+is deterministic: equal data give equal answers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 
 from flipproof.film.curves import SLICES, STEP, Curve, Equation
 from flipproof.film.hand import FIRST, LAST, MOTIONS, REACH, SEARCH
-from flipproof.film.kernel.scoring import turnings
+from flipproof.film.kernel.scoring import match_turnings
 from flipproof.film.likelihood import GRAVITY, TOUCH, Film, Fit, Held, Likelihood
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
@@ -38,40 +38,40 @@ COARSE: Final = (12, 7)
 FINE: Final = (11, 17)
 """Nodes of the first grid and of the last, along gamma and e."""
 
-FEW: Final = 4
-"""Nodes that matter at the least before a grid is believed to have seen all that does."""
+MIN_RELEVANT: Final = 4
+"""Fewest nodes that must matter before a grid is trusted to cover all that does."""
 
-FASTER: Final = np.geomspace(0.8, 2.5, 12)
-"""omega_0 in units of the angular velocity in the first frames, which the water slows down within them."""
+RATE_FACTORS: Final = np.geomspace(0.8, 2.5, 12)
+"""omega_0 in units of the angular velocity in the first frames, in which the water already slows it down."""
 
-SHORTER: Final = (0.4, 0.55, 0.7, 0.85, 1.0)
-"""Shares of a turning that fits, at whose ends the touch may be."""
+TOUCH_SHARES: Final = (0.4, 0.55, 0.7, 0.85, 1.0)
+"""Shares of a matching turning at whose end the touch may be."""
 
 NEGLIGIBLE: Final = 9.0
 """Logarithm of how much less likely than the best a pair must be to be left out."""
 
 EDGE: Final = 5.0
-"""The same of a row at a grid's edge, beyond which the grid grows."""
+"""The same for a row at a grid's edge; if it is more likely, the grid grows."""
 
-ENOUGH: Final = 40
-"""Cells that share the mass of the posterior, at the least, before they are cut no further."""
+MIN_CELLS: Final = 40
+"""Effective number of cells that share the posterior mass from which on they are cut no further."""
 
-DEEPEST: Final = 4
-"""Times that a cell is cut at the most."""
+MAX_CUTS: Final = 4
+"""Largest number of times that a cell is cut."""
 
-HOPELESS: Final = 250.0
-"""Logarithm of how much less likely than the best a first guess is left out, beyond what ``_implausible`` may cost."""
+MAX_GUESS_EXCESS: Final = 250.0
+"""Logarithm of how much less likely than the best a first guess must be to be left out, beyond its implausibility."""
 
-EARTHLY: Final = 0.15
-"""Relative error of gravity up to which a film is believed at once: its stick may be off."""
+MAX_GRAVITY_ERROR: Final = 0.15
+"""Relative error of gravity up to which a film is accepted at once: its stick may be off."""
 
 DRAWS: Final = 8000
 """Sets of parameters drawn from the posterior."""
 
 TRUST: Final = 0.7
-"""Power of likelihood and prior in the posterior that is drawn: no hand and no click is quite what they take it for.
+"""Power of likelihood and prior in the posterior that is drawn: no hand and no click is quite as they assume.
 
-It makes intervals 1.2 times as wide, as deviations in 55 films of another author asked for. Evidence is not touched.
+It makes intervals 1.2 times as wide, as deviations in 55 films of another author required. Evidence is unaffected.
 """
 
 UNITS: Final = {
@@ -90,15 +90,15 @@ class Estimate:
 
     Parameters
     ----------
-    film, throw, solver, held : what was asked
+    film, throw, solver, held : the arguments
     likelihood : Likelihood - with the time of the touch
     curve, fit : of the most likely pair
     draws : name -> (DRAWS,) - the posterior; names and units as of ``UNITS``
     evidence : float - logarithm of the density of the data under this equation
     touched : bool - whether the record goes on after the flight
     flights : int - of the solver
-    complete : bool - whether the time sufficed for the grid to close in
-    guess : float - cost of the likeliest first guess
+    complete : bool - whether there was time for the grid to close in
+    first_guess_cost : float - of the likeliest first guess
     """
 
     film: Film
@@ -113,7 +113,7 @@ class Estimate:
     touched: bool
     flights: int
     complete: bool
-    guess: float = 0.0
+    first_guess_cost: float = 0.0
 
     @property
     def best(self) -> dict[str, float]:
@@ -124,7 +124,7 @@ class Estimate:
         """Return the shortest interval that holds a parameter with this probability."""
         if name != "gamma":
             return shortest(self.draws[name], level)
-        # In the coordinate in which all values are equally likely beforehand.
+        # In the coordinate whose prior is flat.
         scale = SCALE * abs(self.best["omega0"])
         low, high = shortest(np.arcsinh(self.draws[name] / scale), level)
         return scale * math.sinh(low), scale * math.sinh(high)
@@ -138,7 +138,7 @@ class Estimate:
     @property
     def doubted(self) -> NDArray[np.bool_]:
         """Which clicks in flight are more likely bad than not, shape (B, P)."""
-        _, good, _ = self.likelihood.pieces(self.curve, self.fit.x)
+        _, good, _ = self.likelihood.per_click(self.curve, self.fit.x)
         return np.asarray((good < 0.5) & self.film.clicked & self.flying)
 
 
@@ -166,7 +166,7 @@ def estimate(
     ----------
     throw : what is known: bottle, water, gravity; the rest is fitted
     slices : of the equation; ``SLICES`` or the throw's, if fewer, by default
-    seconds : after which the grid is refined no further; the estimate is not ``complete`` then
+    seconds : after which the grid is not refined further; the estimate is then not ``complete``
     tick : called with the number of flights made
 
     Raises
@@ -176,24 +176,24 @@ def estimate(
     """
     held = held or Held()
     sliced = throw.with_slices(slices or min(throw.n_slices, SLICES))
-    starts = _start(thinned(film), sliced, held)
+    starts = _first_guesses(thinned(film), sliced, held)
 
-    first = replace(_estimated(film, sliced, solver, held, starts, seconds, tick), guess=starts[0][0])
-    earthly = [guess for guess in starts if guess[1].two and _earthly(guess[2])]
-    if not first.likelihood.two or _earthly(first.fit.x) or not earthly:
+    first = replace(_estimate_from(film, sliced, solver, held, starts, seconds, tick), first_guess_cost=starts[0][0])
+    plausible = [guess for guess in starts if guess[1].planar and _gravity_plausible(guess[2])]
+    if not first.likelihood.planar or _gravity_plausible(first.fit.x) or not plausible:
         return first
-    # A film whose gravity cannot be right is read anew from what falls as things do, if anything does.
-    second = _estimated(film, sliced, solver, held, earthly, seconds, tick)
-    sound = _earthly(second.fit.x) and second.best["noise"] < 2.0 * film.scatter()
-    return replace(second, guess=earthly[0][0]) if sound else first
+    # A film whose gravity cannot be right is fitted again from guesses with a plausible one, if there are any.
+    second = _estimate_from(film, sliced, solver, held, plausible, seconds, tick)
+    accepted = _gravity_plausible(second.fit.x) and second.best["noise"] < 2.0 * film.scatter()
+    return replace(second, first_guess_cost=plausible[0][0]) if accepted else first
 
 
-def _earthly(x: FloatArray) -> bool:
+def _gravity_plausible(x: FloatArray) -> bool:
     """Return whether a film's gravity is about the earth's."""
-    return abs(math.hypot(x[7], x[8]) / GRAVITY - 1.0) < EARTHLY
+    return abs(math.hypot(x[7], x[8]) / GRAVITY - 1.0) < MAX_GRAVITY_ERROR
 
 
-def _estimated(
+def _estimate_from(
     film: Film,
     sliced: Scenario,
     solver: str,
@@ -203,45 +203,45 @@ def _estimated(
     tick: Callable[[int], object],
 ) -> Estimate:
     """Return the estimate from first guesses."""
-    made, began = 0, time.perf_counter()
+    n_flights, start_time = 0, time.perf_counter()
 
     def count(flights: int) -> None:
-        nonlocal made
-        made += flights
+        nonlocal n_flights
+        n_flights += flights
         tick(flights)
 
     reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, _, x in starts) + 0.5  # the touch may turn out later
     equation = Equation(solver, sliced, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
-    likelihood, x = starts[0][1:] if len(starts) == 1 else _chosen(starts, equation)
-    if likelihood.two:
-        likelihood = likelihood.but(film=film, count=MOTIONS, rest=SEARCH)
+    likelihood, x = starts[0][1:] if len(starts) == 1 else _best_start(starts, equation)
+    if likelihood.planar:
+        likelihood = likelihood.replaced(film=film, count=MOTIONS, rest=SEARCH)
         x = np.insert(x, -2, np.zeros(3 * (MOTIONS - 1)))
-    likelihood, grid, complete = _closed_in(likelihood, equation, x, seconds)
-    if not np.isfinite(grid.masses).any():
+    likelihood, grid, complete = _adaptive_grid(likelihood, equation, x, seconds)
+    if not np.isfinite(grid.log_masses).any():
         raise NoFlightError(f"{film.label}: {solver}: no flight fits the clicks; check that y points up")
     if complete:
-        grid = _refined(likelihood, equation, grid, began + seconds)
+        grid = _refine(likelihood, equation, grid, start_time + seconds)
     fits, curves = grid.fits, grid.curves
-    best = int(np.argmax(grid.levels))
+    best = int(np.argmax(grid.log_densities))
     draws = _draws(likelihood, grid)
-    times, costs, _ = _touches(likelihood, curves[best], fits[best].x)
-    chance = np.exp(TRUST * (costs.min() - costs))
+    times, costs, _ = _touch_costs(likelihood, curves[best], fits[best].x)
+    prob = np.exp(TRUST * (costs.min() - costs))
     rng = np.random.default_rng(1)
-    picked = rng.choice(len(times), DRAWS, p=chance / chance.sum())
-    draws["touch"] = times[picked] + (times[1] - times[0]) * (rng.random(DRAWS) - 0.5)
-    likelihood = likelihood.but(film=film)
+    drawn = rng.choice(len(times), DRAWS, p=prob / prob.sum())
+    draws["touch"] = times[drawn] + (times[1] - times[0]) * (rng.random(DRAWS) - 0.5)
+    likelihood = likelihood.replaced(film=film)
     return Estimate(
         film=film, throw=sliced, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
-        draws=draws, evidence=float(np.logaddexp.reduce(grid.masses) - np.log(np.arcsinh(MAX_RATE / SCALE))),
-        touched=bool(likelihood.touch < film.t[-1]), flights=made, complete=complete,
+        draws=draws, evidence=float(np.logaddexp.reduce(grid.log_masses) - np.log(np.arcsinh(MAX_RATE / SCALE))),
+        touched=bool(likelihood.touch < film.t[-1]), flights=n_flights, complete=complete,
     )  # fmt: skip
 
 
 def near_flight(film: Film, likelihood: Likelihood, release: float) -> Likelihood:
-    """Return the likelihood of a film's frames in flight and of those before and after it, which say when it is."""
+    """Return the likelihood of a film's frames in flight and of those around it, which determine its ends."""
     near = (film.t >= release - REACH) & (film.t <= likelihood.touch + REACH)
-    part = replace(film, t=film.t[near], values=film.values[:, near], lines=film.lines[near])
-    return likelihood.but(film=part)
+    nearby = replace(film, t=film.t[near], values=film.values[:, near], lines=film.lines[near])
+    return likelihood.replaced(film=nearby)
 
 
 # ---------------------------------------------------------------------- the grid over gamma and e
@@ -253,7 +253,7 @@ class Grid:
 
     Parameters
     ----------
-    nodes, cells : (C, 2) - middles of cells and their sizes
+    nodes, cells : (C, 2) - centres of cells and their sizes
     curves, fits : of each node
     """
 
@@ -263,154 +263,156 @@ class Grid:
     fits: list[Fit]
 
     @property
-    def levels(self) -> FloatArray:
+    def log_densities(self) -> FloatArray:
         """Logarithm of the density of the data at every node, (C,)."""
         return np.array([fit.evidence for fit in self.fits])
 
     @property
-    def masses(self) -> FloatArray:
+    def log_masses(self) -> FloatArray:
         """Logarithm of its integral over every cell, (C,)."""
-        return np.asarray(self.levels + np.log(self.cells).sum(axis=1))
+        return np.asarray(self.log_densities + np.log(self.cells).sum(axis=1))
 
 
-def _closed_in(
+def _adaptive_grid(
     likelihood: Likelihood, equation: Equation, x: FloatArray, seconds: float
 ) -> tuple[Likelihood, Grid, bool]:
     """Return the likelihood with its touch settled, the last grid, and whether it closed in on all that matters."""
     low, high = np.zeros(2), np.array([np.arcsinh(MAX_RATE / SCALE), 1.0])
-    seeds, nearest = np.array([[np.nan, np.nan]]), [x]
+    seeds, seed_x = np.array([[np.nan, np.nan]]), [x]
     shape = COARSE
-    film, began = likelihood.film, time.perf_counter()
+    film, start_time = likelihood.film, time.perf_counter()
     descended = False
     for _ in range(16):
         cell = (high - low) / shape
         axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
         nodes = np.array(list(product(*axes)))
-        x = nearest[0]
+        x = seed_x[0]
         likelihood = near_flight(film, likelihood, float(x[0]))
-        tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
+        tilt = float(np.arctan2(x[7], -x[8])) if likelihood.planar else 0.0
         rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
-        flown = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
-        nodes = nodes[[curve is not None for curve in flown]]
-        curves = [curve for curve in flown if curve is not None]
+        solved = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
+        nodes = nodes[[curve is not None for curve in solved]]
+        curves = [curve for curve in solved if curve is not None]
         if not curves:
             raise ValueError(f"{equation.solver}: gives up on every throw that could be this one")
-        near = [nearest[int(np.nanargmin(((seeds - node) ** 2 / (cell**2)).sum(axis=1)))] if len(nearest) > 1 else x
+        initial = [seed_x[int(np.nanargmin(((seeds - node) ** 2 / (cell**2)).sum(axis=1)))] if len(seed_x) > 1 else x
                 for node in nodes]  # fmt: skip
-        fits = [likelihood.fitted(curve, start) for curve, start in zip(curves, near, strict=True)]
-        levels = np.array([fit.evidence for fit in fits])
-        order = np.argsort(-levels)
+        fits = [likelihood.fitted(curve, start) for curve, start in zip(curves, initial, strict=True)]
+        log_densities = np.array([fit.evidence for fit in fits])
+        order = np.argsort(-log_densities)
         best = int(order[0])
-        if time.perf_counter() - began > 0.5 * seconds:
+        if time.perf_counter() - start_time > 0.5 * seconds:
             break
         if shape == FINE:
-            # Rows of a coarse grid lie beside a narrow ridge, which looks shorter then than it is.
-            grown = _grown(nodes, levels, cell, (low, high))
-            if np.array_equal(grown, (low, high)):
+            # Rows of a coarse grid miss a narrow ridge, which then looks shorter than it is.
+            extended = _extended_box(nodes, log_densities, cell, (low, high))
+            if np.array_equal(extended, (low, high)):
                 break
-            low, high = grown
-            seeds, nearest = nodes[order], [fits[k].x for k in order]
+            low, high = extended
+            seeds, seed_x = nodes[order], [fits[k].x for k in order]
             continue
         settled = settle(likelihood, curves[best], fits[best].x)
         if settled is not likelihood:
             likelihood = settled
             fits = [likelihood.fitted(curve, fit.x) for curve, fit in zip(curves, fits, strict=True)]
-            levels = np.array([fit.evidence for fit in fits])
-            order = np.argsort(-levels)
+            log_densities = np.array([fit.evidence for fit in fits])
+            order = np.argsort(-log_densities)
             best = int(order[0])
-        pad = cell
-        if (levels > levels[best] - NEGLIGIBLE).sum() <= FEW:
-            # What matters is smaller than a cell: descents from several nodes say where it is. The first are from the
-            # best of each row of e, across which one rebound more or less folds the likelihood.
+        margin = cell
+        if (log_densities > log_densities[best] - NEGLIGIBLE).sum() <= MIN_RELEVANT:
+            # What matters is smaller than a cell: descents from several nodes find it. The first start from the best
+            # of each row of e, across which one rebound more or less folds the likelihood.
             _, first = np.unique(nodes[order, 1], return_index=True)
             for k in order[:3] if descended else order[first]:
-                more = _descent(likelihood, equation, nodes[k], fits[k].x, cell, (low, high))
-                nodes = np.concatenate((nodes, [trial[0] for trial in more]))
-                curves += [trial[1] for trial in more]
-                fits += [trial[2] for trial in more]
+                trials = _descent(likelihood, equation, nodes[k], fits[k].x, cell, (low, high))
+                nodes = np.concatenate((nodes, [trial[0] for trial in trials]))
+                curves += [trial[1] for trial in trials]
+                fits += [trial[2] for trial in trials]
             descended = True
-            levels = np.array([fit.evidence for fit in fits])
-            order = np.argsort(-levels)
-            best, pad = int(order[0]), 0.3 * cell
-        matters = np.union1d(np.flatnonzero(levels > levels[best] - NEGLIGIBLE), order[:3])
-        seeds, nearest = nodes[order], [fits[k].x for k in order]
-        wide = high - low
-        low = np.maximum(low, nodes[matters].min(axis=0) - pad)
-        high = np.minimum(high, nodes[matters].max(axis=0) + pad)
-        if np.prod((high - low) / wide) > 0.4:
+            log_densities = np.array([fit.evidence for fit in fits])
+            order = np.argsort(-log_densities)
+            best, margin = int(order[0]), 0.3 * cell
+        relevant = np.union1d(np.flatnonzero(log_densities > log_densities[best] - NEGLIGIBLE), order[:3])
+        seeds, seed_x = nodes[order], [fits[k].x for k in order]
+        width = high - low
+        low = np.maximum(low, nodes[relevant].min(axis=0) - margin)
+        high = np.minimum(high, nodes[relevant].max(axis=0) + margin)
+        if np.prod((high - low) / width) > 0.4:
             shape = FINE
-            likelihood = likelihood.but(rest=LAST)
+            likelihood = likelihood.replaced(rest=LAST)
     return likelihood, Grid(nodes, np.broadcast_to(cell, nodes.shape), curves, fits), shape == FINE
 
 
-def _refined(likelihood: Likelihood, equation: Equation, grid: Grid, ends: float) -> Grid:
+def _refine(likelihood: Likelihood, equation: Equation, grid: Grid, deadline: float) -> Grid:
     """Return the grid with cells that matter, and those beside them, cut in four until enough of them share the mass.
 
-    A ridge may be narrower than a cell, and lie across the grid. ``ends`` is when there is no time left to go on.
+    A ridge may be narrower than a cell, and oblique to the grid. After ``deadline`` nothing is cut.
     """
-    for _ in range(DEEPEST):
-        mass = np.exp(grid.masses - grid.masses.max())
-        if mass.sum() ** 2 / (mass**2).sum() > ENOUGH or time.perf_counter() > ends:
+    for _ in range(MAX_CUTS):
+        mass = np.exp(grid.log_masses - grid.log_masses.max())
+        if mass.sum() ** 2 / (mass**2).sum() > MIN_CELLS or time.perf_counter() > deadline:
             break
-        matters = grid.levels > grid.levels.max() - EDGE
-        apart = np.abs(grid.nodes[:, None] - grid.nodes[None, matters])
-        touching = apart < 0.51 * (grid.cells[:, None] + grid.cells[None, matters])
-        beside = np.any(np.all(touching, axis=2), axis=1)
-        whole, cut = np.flatnonzero(~beside), np.flatnonzero(beside)
+        relevant = grid.log_densities > grid.log_densities.max() - EDGE
+        distance = np.abs(grid.nodes[:, None] - grid.nodes[None, relevant])
+        adjacent = distance < 0.51 * (grid.cells[:, None] + grid.cells[None, relevant])
+        to_cut = np.any(np.all(adjacent, axis=2), axis=1)
+        kept, cut = np.flatnonzero(~to_cut), np.flatnonzero(to_cut)
         quarters = np.array(list(product((-0.25, 0.25), repeat=2)))
         nodes = (grid.nodes[cut, None] + quarters * grid.cells[cut, None]).reshape(-1, 2)
         parents = [grid.fits[k].x for k in np.repeat(cut, 4)]
-        x = grid.fits[int(np.argmax(grid.levels))].x
-        tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
+        x = grid.fits[int(np.argmax(grid.log_densities))].x
+        tilt = float(np.arctan2(x[7], -x[8])) if likelihood.planar else 0.0
         rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
-        flown = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
-        successes = [k for k, curve in enumerate(flown) if curve is not None]
-        curves = [curve for curve in flown if curve is not None]
+        solved = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
+        successes = [k for k, curve in enumerate(solved) if curve is not None]
+        curves = [curve for curve in solved if curve is not None]
         grid = Grid(
-            np.concatenate((grid.nodes[whole], nodes[successes])),
-            np.concatenate((grid.cells[whole], np.repeat(grid.cells[cut] / 2, 4, axis=0)[successes])),
-            [*(grid.curves[k] for k in whole), *curves],
-            [*(grid.fits[k] for k in whole),
+            np.concatenate((grid.nodes[kept], nodes[successes])),
+            np.concatenate((grid.cells[kept], np.repeat(grid.cells[cut] / 2, 4, axis=0)[successes])),
+            [*(grid.curves[k] for k in kept), *curves],
+            [*(grid.fits[k] for k in kept),
              *(likelihood.fitted(curve, parents[k]) for k, curve in zip(successes, curves, strict=True))],
         )  # fmt: skip
     return grid
 
 
-def _grown(
-    nodes: FloatArray, levels: FloatArray, cell: FloatArray, box: tuple[FloatArray, FloatArray]
+def _extended_box(
+    nodes: FloatArray, log_densities: FloatArray, cell: FloatArray, box: tuple[FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the box, half as long again towards each edge whose outermost row is likely."""
+    """Return the box, extended by half its length beyond each edge whose outermost row is likely."""
     low, high = box[0].copy(), box[1].copy()
-    for k, last in enumerate((np.arcsinh(MAX_RATE / SCALE), 1.0)):
-        likely = nodes[levels > levels.max() - EDGE, k]
+    for k, limit in enumerate((np.arcsinh(MAX_RATE / SCALE), 1.0)):
+        likely = nodes[log_densities > log_densities.max() - EDGE, k]
         length = high[k] - low[k]
         if likely.min() < low[k] + cell[k]:
             low[k] = max(0.0, low[k] - 0.5 * length)
         if likely.max() > high[k] - cell[k]:
-            high[k] = min(last, high[k] + 0.5 * length)
+            high[k] = min(limit, high[k] + 0.5 * length)
     return low, high
 
 
-def _chosen(starts: list[tuple[float, Likelihood, FloatArray]], equation: Equation) -> tuple[Likelihood, FloatArray]:
-    """Return the start that a coarse grid explains best, and where that ends."""
+def _best_start(
+    starts: list[tuple[float, Likelihood, FloatArray]], equation: Equation
+) -> tuple[Likelihood, FloatArray]:
+    """Return the start that a coarse grid explains best, and its fitted parameters."""
     axes = [(np.arange(n) + 0.5) / n for n in COARSE]
     rates = np.array([(SCALE * np.sinh(a * np.arcsinh(MAX_RATE / SCALE)), e) for a, e in product(*axes)])
     best: tuple[float, Likelihood, FloatArray] | None = None
-    flown: list[Curve | None] = []
+    solved: list[Curve | None] = []
     for cost, start, x in starts:
-        if cost > starts[0][0] + HOPELESS:
+        if cost > starts[0][0] + MAX_GUESS_EXCESS:
             break
-        if not flown or equation.weighted:
-            flown = equation.curves(rates, float(x[2]), float(x[1]))
-        pairs = [(curve, start.fitted(curve, x, 15)) for curve in flown if curve is not None]
+        if not solved or equation.weighted:
+            solved = equation.curves(rates, float(x[2]), float(x[1]))
+        pairs = [(curve, start.fitted(curve, x, 15)) for curve in solved if curve is not None]
         for curve, fit in sorted(pairs, key=lambda pair: pair[1].cost)[:4]:
             likelihood = settle(start, curve, fit.x)
             for _ in range(2):
-                again = likelihood.fitted(curve, fit.x)
-                likelihood = settle(likelihood, curve, again.x)
-            cost = again.cost + (_implausible(start.film, again.x) if start.two else 0.0)
+                refit = likelihood.fitted(curve, fit.x)
+                likelihood = settle(likelihood, curve, refit.x)
+            cost = refit.cost + (_implausibility_cost(start.film, refit.x) if start.planar else 0.0)
             if best is None or cost < best[0]:
-                best = cost, likelihood, again.x
+                best = cost, likelihood, refit.x
     return starts[0][1:] if best is None else best[1:]
 
 
@@ -422,52 +424,52 @@ def _descent(
     cell: FloatArray,
     box: tuple[FloatArray, FloatArray],
 ) -> list[tuple[FloatArray, Curve, Fit]]:
-    """Return what Nelder and Mead's simplex sees on its way down from a node; it asks no slopes, which have folds."""
+    """Return the trials of Nelder and Mead's simplex from a node; it needs no slopes, which have folds."""
     trials: list[tuple[FloatArray, Curve, Fit]] = []
-    tilt = float(np.arctan2(x[7], -x[8])) if likelihood.two else 0.0
+    tilt = float(np.arctan2(x[7], -x[8])) if likelihood.planar else 0.0
 
-    def less(place: FloatArray) -> float:
-        rate = np.array([[SCALE * np.sinh(place[0]), place[1]]])
+    def objective(point: FloatArray) -> float:
+        rate = np.array([[SCALE * np.sinh(point[0]), point[1]]])
         (curve,) = equation.curves(rate, float(x[2]), float(x[1]) - tilt)
         if curve is None:
             return math.inf
-        trials.append((place.copy(), curve, likelihood.fitted(curve, trials[-1][2].x if trials else x)))
+        trials.append((point.copy(), curve, likelihood.fitted(curve, trials[-1][2].x if trials else x)))
         return -trials[-1][2].evidence
 
     simplex = np.clip(node + np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]) * cell, *box)
     minimize(
-        less, node, method="Nelder-Mead", bounds=list(zip(*box, strict=True)),
+        objective, node, method="Nelder-Mead", bounds=list(zip(*box, strict=True)),
         options={"initial_simplex": simplex, "maxfev": 40, "xatol": 1e-6, "fatol": 0.5},
     )  # fmt: skip
     return trials
 
 
 def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
-    """Return draws of the posterior: a node, a place in its cell, and the other parameters given it."""
+    """Return draws of the posterior: a node, a point in its cell, and the other parameters given it."""
     rng = np.random.default_rng(0)
-    fits, chance = grid.fits, np.exp(TRUST * (grid.levels - grid.levels.max())) * grid.cells.prod(axis=1)
-    picked = rng.choice(len(fits), DRAWS, p=chance / chance.sum())
-    place = grid.nodes[picked] + (rng.random((DRAWS, 2)) - 0.5) * grid.cells[picked]
+    fits, prob = grid.fits, np.exp(TRUST * (grid.log_densities - grid.log_densities.max())) * grid.cells.prod(axis=1)
+    drawn = rng.choice(len(fits), DRAWS, p=prob / prob.sum())
+    points = grid.nodes[drawn] + (rng.random((DRAWS, 2)) - 0.5) * grid.cells[drawn]
     inner = np.empty((DRAWS, len(fits[0].x)))
-    at = likelihood.index["log_noise"]
-    for k in np.unique(picked):
-        share = np.exp([TRUST * (mode.evidence - fits[k].evidence) for mode in fits[k].modes])
-        kinds = np.where(picked == k, rng.choice(len(share), DRAWS, p=share / share.sum()), -1)
+    noise_index = likelihood.index["log_noise"]
+    for k in np.unique(drawn):
+        weights = np.exp([TRUST * (mode.evidence - fits[k].evidence) for mode in fits[k].modes])
+        kinds = np.where(drawn == k, rng.choice(len(weights), DRAWS, p=weights / weights.sum()), -1)
         for kind, mode in enumerate(fits[k].modes):
-            mine = kinds == kind
-            root = np.linalg.cholesky(np.linalg.inv(TRUST * mode.hessian))
-            moved = rng.standard_normal((int(mine.sum()), len(root))) @ root.T
-            # All deviations grow with the noise, which is a draw, too.
-            wider = np.exp(moved[:, at : at + 1])
-            inner[mine] = mode.x + np.where(np.arange(len(root)) == at, moved, moved * wider)
+            mask = kinds == kind
+            factor = np.linalg.cholesky(np.linalg.inv(TRUST * mode.hessian))
+            deviates = rng.standard_normal((int(mask.sum()), len(factor))) @ factor.T
+            # All deviations grow with the noise, which is itself drawn.
+            widening = np.exp(deviates[:, noise_index : noise_index + 1])
+            inner[mask] = mode.x + np.where(np.arange(len(factor)) == noise_index, deviates, deviates * widening)
     parameters = dict(zip(likelihood.names, inner.T, strict=True))
     draws = {
-        "gamma": SCALE * np.sinh(np.maximum(place[:, 0], 0.0)) * np.abs(parameters["omega0"]),
-        "restitution": np.clip(place[:, 1], 0.0, 1.0),
+        "gamma": SCALE * np.sinh(np.maximum(points[:, 0], 0.0)) * np.abs(parameters["omega0"]),
+        "restitution": np.clip(points[:, 1], 0.0, 1.0),
         **{name: parameters[name] for name in ("omega0", "theta0", "release")},
         "noise": np.exp(parameters["log_noise"]),
     }
-    if likelihood.two:
+    if likelihood.planar:
         tilt = np.arctan2(parameters["ax"], -parameters["ay"])
         draws |= {name: parameters[name] for name in ("length", "x0", "y0", "vx", "vy")}
         draws |= {
@@ -481,74 +483,74 @@ def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
 # ---------------------------------------------------------------------- the touch
 
 
-def _touches(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return times of a touch near the likeliest, 16 to a frame, the cost of each, and the velocity taken."""
+def _touch_costs(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return times of a touch near the likeliest, 16 per frame, the cost of each, and the velocity taken."""
     film = likelihood.film
     step = float(np.median(np.diff(film.t)))
-    if likelihood.held.touch is not None or not likelihood.two or not (film.t > x[0]).any():
+    if likelihood.held.touch is not None or not likelihood.planar or not (film.t > x[0]).any():
         return np.array([likelihood.touch, likelihood.touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
     if likelihood.held.table is not None:
-        touch = _at_table(likelihood, curve, x, likelihood.held.table)
+        touch = _table_touch_time(likelihood, curve, x, likelihood.held.table)
         return np.array([touch, touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
     frames = np.append(film.t[film.t > x[0]], film.t[-1] + step)
-    rough = {speed: likelihood.touches(curve, x, frames, speed) for speed in TOUCH}
-    speed = min(rough, key=lambda velocity: float(rough[velocity].min()))
-    near = frames[int(np.argmin(rough[speed]))]
-    times = np.minimum(near + step * np.arange(-32, 33) / 16, film.t[-1] + step)
-    # How fast the table takes the velocity, and since when, look alike.
-    costs = [likelihood.touches(curve, x, times, velocity) for velocity in TOUCH]
+    coarse = {speed: likelihood.costs_of_touches(curve, x, frames, speed) for speed in TOUCH}
+    speed = min(coarse, key=lambda velocity: float(coarse[velocity].min()))
+    centre = frames[int(np.argmin(coarse[speed]))]
+    times = np.minimum(centre + step * np.arange(-32, 33) / 16, film.t[-1] + step)
+    # How fast the table takes the velocity is confounded with when it starts to.
+    costs = [likelihood.costs_of_touches(curve, x, times, velocity) for velocity in TOUCH]
     return times, -np.asarray(np.logaddexp.reduce(-np.array(costs), axis=0)), speed
 
 
-def _at_table(likelihood: Likelihood, curve: Curve, x: FloatArray, height: float) -> float:
-    """Return when the fitted bottle, falling, comes down to the table with an end."""
+def _table_touch_time(likelihood: Likelihood, curve: Curve, x: FloatArray, height: float) -> float:
+    """Return when an end of the fitted, falling bottle reaches the table."""
     film = likelihood.film
     times = np.linspace(float(x[0]), float(film.t[-1]), 2000)
     dense = replace(film, t=times, values=np.zeros((2, len(times), 2)), lines=np.zeros(len(times), dtype=np.int64))
     values, _ = Likelihood(dense, Held(), np.inf, 1.0).model(curve, x)
     lowest = values[:, :, 1].min(axis=0)
-    below = np.flatnonzero((lowest[1:] <= height) & (lowest[:-1] > height))
-    if not len(below):
+    crossings = np.flatnonzero((lowest[1:] <= height) & (lowest[:-1] > height))
+    if not len(crossings):
         raise ValueError(
             f"{film.label}: table_height = {height:g} m: the bottle never comes down to it; its lowest end is in "
             f"[{lowest.min():.4g}, {lowest.max():.4g}] m"
         )
-    return float(times[below[-1] + 1])
+    return float(times[crossings[-1] + 1])
 
 
 def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
-    """Return the likelihood with the most likely touch; the same one if it is the present one."""
-    times, costs, speed = _touches(likelihood, curve, x)
+    """Return the likelihood with the most likely touch; the same object if the touch stays."""
+    times, costs, speed = _touch_costs(likelihood, curve, x)
     touch = float(times[int(np.argmin(costs))])
     if abs(touch - likelihood.touch) < 1e-9 and speed == likelihood.speed:
         return likelihood
-    return likelihood.but(touch=touch, speed=speed)
+    return likelihood.replaced(touch=touch, speed=speed)
 
 
 # ---------------------------------------------------------------------- the start
 
 
-def exchange_gain(one: Estimate, doubted: float) -> float:
+def exchange_gain(result: Estimate, threshold: float) -> float:
     """Return by how much the clicks become likelier (logarithm) if cap and base are exchanged; -inf without a flight.
 
-    First guesses are compared; where these gain more than ``doubted``, as they did in 1 of 30 right films, both labels
-    are estimated and compared.
+    First guesses are compared; if they gain more than ``threshold``, as in 1 of 30 correct films, both labellings are
+    estimated and compared.
     """
-    film = one.film
+    film = result.film
     try:
-        costs = [one.guess, _start(exchanged(thinned(film)), one.throw, one.held)[0][0]]
-        if costs[0] - costs[1] > doubted:
-            other = estimate(exchanged(film), one.throw, one.solver, one.held)
-            costs = [each.likelihood.pieces(each.curve, each.fit.x)[0].sum() for each in (one, other)]
+        costs = [result.first_guess_cost, _first_guesses(exchanged(thinned(film)), result.throw, result.held)[0][0]]
+        if costs[0] - costs[1] > threshold:
+            swapped = estimate(exchanged(film), result.throw, result.solver, result.held)
+            costs = [fit.likelihood.per_click(fit.curve, fit.fit.x)[0].sum() for fit in (result, swapped)]
     except NoFlightError:
         return -math.inf
     return float(costs[0] - costs[1])
 
 
 def thinned(film: Film) -> Film:
-    """Return a film of some hundred of the frames, evenly chosen, for first guesses."""
-    some = slice(None, None, max(1, len(film.t) // 80)) if film.quantity == "points" else slice(None)
-    return replace(film, t=film.t[some], values=film.values[:, some], lines=film.lines[some])
+    """Return a film of about a hundred frames, evenly chosen, for first guesses."""
+    subset = slice(None, None, max(1, len(film.t) // 80)) if film.quantity == "points" else slice(None)
+    return replace(film, t=film.t[subset], values=film.values[:, subset], lines=film.lines[subset])
 
 
 def exchanged(film: Film) -> Film:
@@ -556,14 +558,14 @@ def exchanged(film: Film) -> Film:
     return replace(film, values=film.values[::-1].copy())
 
 
-def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelihood, FloatArray]]:
+def _first_guesses(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelihood, FloatArray]]:
     """Return first guesses, the likeliest first: its cost, a likelihood with a touch, and the inner parameters.
 
-    Every frame may be the release: the turning that follows is held against free flight with little, some and much
-    drag, and those that stay with it, and with a parabola, are taken.
+    Every frame may be the release: the turning that follows is compared with free flight at little, some and much
+    drag, and those that follow it, and a parabola, are taken.
     """
     if film.quantity != "points":
-        return [(0.0, *_start_table(film, held))]
+        return [(0.0, *_first_guess_of_table(film, held))]
     theta, t = film.angle, film.t
     frames = np.flatnonzero(~np.isnan(theta))
     if len(frames) < 8:
@@ -577,109 +579,109 @@ def _start(film: Film, throw: Scenario, held: Held) -> list[tuple[float, Likelih
     step = float(np.median(np.diff(t)))
     equation = Equation("free-flight", throw, 30.0)
     pairs = np.array(list(product((0.02, 0.07, 0.2, 0.5, 1.2), (0.2, 0.5, 0.8))))
-    every = [curve for curve in equation.curves(pairs, 20.0, 0.0) if curve]
+    curves = [curve for curve in equation.curves(pairs, 20.0, 0.0) if curve]
     angle, times = theta[frames], t[frames]
-    first = np.arange(len(frames)) if held.release is None else np.flatnonzero(times >= held.release - 1e-9)
-    first = first[:: max(1, len(first) // 80)]
-    rates = np.outer([_rate(times[k:], angle[k:], max(4, int(0.03 / step))) for k in first], FASTER)
-    matches = turnings(angle, times, first, rates, np.array([curve.rows for curve in every]), STEP, 0.3)
-    tried: list[tuple[float, Likelihood, FloatArray]] = []
-    for k, (score, index, omega0, start, last) in zip(first, matches, strict=True):
+    starts = np.arange(len(frames)) if held.release is None else np.flatnonzero(times >= held.release - 1e-9)
+    starts = starts[:: max(1, len(starts) // 80)]
+    rates = np.outer([_initial_rate(times[k:], angle[k:], max(4, int(0.03 / step))) for k in starts], RATE_FACTORS)
+    matches = match_turnings(angle, times, starts, rates, np.array([curve.rows for curve in curves]), STEP, 0.3)
+    candidates: list[tuple[float, Likelihood, FloatArray]] = []
+    for k, (score, index, omega0, start, last) in zip(starts, matches, strict=True):
         if score < 0.4 * matches[:, 0].max() or not score:
             continue
-        curve, end = every[int(index)], float(times[int(last)])
+        curve, end = curves[int(index)], float(times[int(last)])
         spin = np.array([times[k], start, omega0])
-        # The turning may go on like that on the table, which bends the parabola: fits begin with earlier touches, too.
-        ends = [times[k] + part * (end - times[k]) for part in SHORTER] if held.touch is None else [held.touch]
-        begins = []
-        for touch in ends:
-            x, noise = _placed(film, curve, spin, touch, length)
-            begin = Likelihood(film, held, touch, max(noise, 1e-5))
-            begins.append((begin.terms(curve, x)[0] + _implausible(film, x), begin, x))
-        begins.sort(key=lambda guess: guess[0])
-        for _, begin, x in begins[:3]:
-            earthly = begin.but()
-            earthly.expected[8], earthly.stiffness[:, 8] = -GRAVITY, 0.5**-2
-            x = earthly.fitted(curve, x, 8).x
-            better = _better(settle(begin, curve, x), curve, x)
-            if better[2][8] < 0.0:  # what accelerates upwards is no flight
-                tried.append(better)
-    # The turning late in a flight looks like one of its own: releases far apart are tried with every curve.
-    tried.sort(key=lambda guess: guess[0])
-    apart_by: list[tuple[float, Likelihood, FloatArray]] = []
-    for guess in tried:
-        if len(apart_by) < 5 and all(
-            abs(guess[2][0] - other[2][0]) > 0.04 or abs(guess[1].touch - other[1].touch) > 0.08 for other in apart_by
+        # The turning may continue on the table, which bends the parabola: fits also begin with earlier touches.
+        touches = [times[k] + q * (end - times[k]) for q in TOUCH_SHARES] if held.touch is None else [held.touch]
+        beginnings = []
+        for touch in touches:
+            x, noise = _fit_place(film, curve, spin, touch, length)
+            likelihood = Likelihood(film, held, touch, max(noise, 1e-5))
+            beginnings.append((likelihood.terms(curve, x)[0] + _implausibility_cost(film, x), likelihood, x))
+        beginnings.sort(key=lambda guess: guess[0])
+        for _, likelihood, x in beginnings[:3]:
+            with_gravity = likelihood.replaced()
+            with_gravity.expected[8], with_gravity.stiffness[:, 8] = -GRAVITY, 0.5**-2
+            x = with_gravity.fitted(curve, x, 8).x
+            improved = _improve(settle(likelihood, curve, x), curve, x)
+            if improved[2][8] < 0.0:  # what accelerates upwards is no flight
+                candidates.append(improved)
+    # The end of a flight looks like a flight of its own: releases far apart are tried with every curve.
+    candidates.sort(key=lambda guess: guess[0])
+    distinct: list[tuple[float, Likelihood, FloatArray]] = []
+    for guess in candidates:
+        if len(distinct) < 5 and all(
+            abs(guess[2][0] - other[2][0]) > 0.04 or abs(guess[1].touch - other[1].touch) > 0.08 for other in distinct
         ):
-            apart_by.append(guess)
-    if not apart_by:
+            distinct.append(guess)
+    if not distinct:
         raise NoFlightError(
             f"{film.label}: no stretch of the film is free flight; check that y points up and that cap and base are "
             "not exchanged, or give --release and --landing"
         )
     polished = [
-        min((_better(guess[1], curve, guess[2]) for curve in every), key=lambda other: other[0]) for guess in apart_by
+        min((_improve(guess[1], curve, guess[2]) for curve in curves), key=lambda other: other[0]) for guess in distinct
     ]
     return sorted(polished, key=lambda guess: guess[0])
 
 
-def _implausible(film: Film, x: FloatArray) -> float:
-    """Return the cost of a gravity unlike the earth's, and of misses unlike the scatter of the bottle's length.
+def _implausibility_cost(film: Film, x: FloatArray) -> float:
+    """Return the cost of a gravity unlike the earth's, and of noise above the scatter of the bottle's length.
 
-    Either is bounded: a clock or a stick far off is found, too, and water that no curve of a first guess describes.
+    Both are bounded, so as to admit a clock or a stick far off, and water that no curve of a first guess describes.
     """
     gravity = math.log(math.hypot(x[7], x[8]) / GRAVITY) / 0.1
-    misses = max(0.0, float(x[-2]) - math.log(3.0 * film.scatter() + 1e-6)) / 0.2
-    return min(100.0, 0.5 * gravity**2) + min(100.0, 0.5 * misses**2)
+    excess_noise = max(0.0, float(x[-2]) - math.log(3.0 * film.scatter() + 1e-6)) / 0.2
+    return min(100.0, 0.5 * gravity**2) + min(100.0, 0.5 * excess_noise**2)
 
 
-def _better(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[float, Likelihood, FloatArray]:
-    """Return cost, likelihood and parameters after some steps, the touch settled among them."""
+def _improve(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[float, Likelihood, FloatArray]:
+    """Return cost, likelihood and parameters after some steps, between which the touch is settled."""
     fit = likelihood.fitted(curve, x, 8)
     likelihood = settle(likelihood, curve, fit.x)
     fit = likelihood.fitted(curve, fit.x, 8)
-    return fit.cost + _implausible(likelihood.film, fit.x), likelihood, fit.x
+    return fit.cost + _implausibility_cost(likelihood.film, fit.x), likelihood, fit.x
 
 
-def _rate(t: FloatArray, angle: FloatArray, window: int) -> float:
-    """Return the angular velocity in the first frames [rad/s]; 0 of too few."""
-    head, times = np.unwrap(angle[: window + 1]), t[: window + 1]
-    lag = max(1, len(head) // 2)
-    return float(np.median((head[lag:] - head[:-lag]) / (times[lag:] - times[:-lag]))) if len(head) > lag else 0.0
+def _initial_rate(t: FloatArray, angle: FloatArray, window: int) -> float:
+    """Return the angular velocity in the first frames [rad/s]; 0 if they are too few."""
+    angles, times = np.unwrap(angle[: window + 1]), t[: window + 1]
+    lag = max(1, len(angles) // 2)
+    return float(np.median((angles[lag:] - angles[:-lag]) / (times[lag:] - times[:-lag]))) if len(angles) > lag else 0.0
 
 
-def _placed(film: Film, curve: Curve, spin: FloatArray, end: float, length: float) -> tuple[FloatArray, float]:
-    """Return all inner parameters for a given spin, the place by a robust linear fit up to ``end``, and the noise."""
-    inside = (film.t >= spin[0] - 1e-9) & (film.t <= end + 1e-9)
-    part = replace(film, t=film.t[inside], values=film.values[:, inside], lines=film.lines[inside])
+def _fit_place(film: Film, curve: Curve, spin: FloatArray, end: float, length: float) -> tuple[FloatArray, float]:
+    """Return all inner parameters for a given spin, a robust linear fit of the place up to ``end``, and the noise."""
+    in_flight = (film.t >= spin[0] - 1e-9) & (film.t <= end + 1e-9)
+    flight = replace(film, t=film.t[in_flight], values=film.values[:, in_flight], lines=film.lines[in_flight])
     x = np.array([*spin, *[0.0] * 5, -9.81, length, 0.0, 0.0, 0.0, np.log(0.002), np.log(FIRST.size)])
-    likelihood = Likelihood(part, Held(), end, 0.002)
+    likelihood = Likelihood(flight, Held(), end, 0.002)
     values, slopes = likelihood.model(curve, x)
-    seen = np.repeat(part.clicked[:, :, None], 2, axis=2).ravel()
-    matrix, rest = slopes[..., 3:10].reshape(-1, 7)[seen], (part.values - values).ravel()[seen]
-    weight: FloatArray = np.ones(len(rest))
-    move: NDArray[Any] = np.zeros(7)
+    clicked = np.repeat(flight.clicked[:, :, None], 2, axis=2).ravel()
+    design, residual = slopes[..., 3:10].reshape(-1, 7)[clicked], (flight.values - values).ravel()[clicked]
+    weight: FloatArray = np.ones(len(residual))
+    correction: NDArray[Any] = np.zeros(7)
     noise = 1.0
     for _ in range(6):
-        move = np.linalg.lstsq(matrix * weight[:, None], rest * weight, rcond=None)[0]
-        left: FloatArray = rest - matrix @ move
-        noise = 1.4826 * float(np.median(np.abs(left))) + 1e-6
-        weight = 1.0 / np.sqrt(1.0 + (left / (3 * noise)) ** 2)
-    x[3:10] += move
+        correction = np.linalg.lstsq(design * weight[:, None], residual * weight, rcond=None)[0]
+        remaining: FloatArray = residual - design @ correction
+        noise = 1.4826 * float(np.median(np.abs(remaining))) + 1e-6
+        weight = 1.0 / np.sqrt(1.0 + (remaining / (3 * noise)) ** 2)
+    x[3:10] += correction
     x[9] = length
     x[-2] = np.log(noise)
     return x, noise
 
 
-def _start_table(film: Film, held: Held) -> tuple[Likelihood, FloatArray]:
+def _first_guess_of_table(film: Film, held: Held) -> tuple[Likelihood, FloatArray]:
     """Return a first guess from the first eighth of a table of theta or omega that begins at its release."""
     values, t = film.values[0, :, 0], film.t
     release = float(t[0]) if held.release is None else held.release
     count = max(6, len(t) // 8)
     turning = np.unwrap(values) if film.quantity == "theta" else values
-    line = np.polynomial.Polynomial.fit(t[:count] - release, turning[:count], 2 if film.quantity == "theta" else 1)
+    poly = np.polynomial.Polynomial.fit(t[:count] - release, turning[:count], 2 if film.quantity == "theta" else 1)
     theta0, omega0 = (
-        (float(line(0.0)), float(line.deriv()(0.0))) if film.quantity == "theta" else (0.0, float(line(0.0)))
+        (float(poly(0.0)), float(poly.deriv()(0.0))) if film.quantity == "theta" else (0.0, float(poly(0.0)))
     )
     noise = max(third_differences(values), 1e-7 * float(np.ptp(values)), 1e-12)
     likelihood = Likelihood(film, replace(held, release=release), float(t[-1]), noise)

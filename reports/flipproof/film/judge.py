@@ -1,4 +1,4 @@
-"""What an estimate is worth: sound or refused, explained or not, told or not; and several equations, several films."""
+"""How good an estimate is: sound or refused, explained, determined by the data; several equations and films."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import gaussian_kde, norm
 
 from flipproof.film.estimate import DRAWS, MAX_RATE, SCALE, UNITS, Estimate, exchange_gain, shortest, third_differences
-from flipproof.film.fall import before
+from flipproof.film.fall import hand_share
 from flipproof.film.likelihood import GRAVITY
 from slicemodel.trajectory import FloatArray
 
@@ -26,13 +26,13 @@ FALL_ERROR: Final = 0.25
 """Relative error of g beyond which an equation explains no flight, however little the film says of g."""
 
 OUTDONE: Final = 20.0
-"""Difference from which on an equation does not explain a film: it leaves to the hand what another takes for flight."""
+"""Difference from which an equation does not explain a film: it ascribes to the hand what another takes for flight."""
 
 SCALE_ERROR: Final = 0.03
-"""Relative error of g that a stick held beside the plane of the throw may make."""
+"""Relative error of g that a stick outside the plane of the throw may cause."""
 
 EXCHANGED: Final = 20.0
-"""Logarithm of a ratio of likelihoods: a film that gains more when cap and base are exchanged is refused."""
+"""Logarithm of a ratio of likelihoods: a film that gains more by exchanging cap and base is refused."""
 
 SHOWN: Final = ("gamma", "restitution", "omega0", "theta0", "release", "touch", "tilt", "g", "noise", "length")
 
@@ -42,18 +42,18 @@ class UnsoundError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
-    """An estimate with what its residuals say.
+class Assessment:
+    """An estimate with the diagnostics of its residuals.
 
     Parameters
     ----------
     estimate : Estimate
-    behind : float
-        By how much the logarithm of its evidence is below that of the best equation fitted to the same film.
+    log_deficit : float
+        By how much its log evidence is below that of the best equation fitted to the same film.
     """
 
     estimate: Estimate
-    behind: float = 0.0
+    log_deficit: float = 0.0
 
     @cached_property
     def flying(self) -> NDArray[np.bool_]:
@@ -65,7 +65,7 @@ class Judged:
     def fitted(self) -> tuple[FloatArray, FloatArray]:
         """theta and omega of the fitted flight at the film's frames, in the picture, each (P,)."""
         estimate, x = self.estimate, self.estimate.fit.x
-        tilt = math.atan2(x[7], -x[8]) if estimate.likelihood.two else 0.0
+        tilt = math.atan2(x[7], -x[8]) if estimate.likelihood.planar else 0.0
         turned, rate, *_ = estimate.curve.at(abs(x[2]) * (estimate.film.t - x[0]), float(x[2]), float(x[1]) - tilt)
         return x[1] + np.sign(x[2]) * turned, x[2] * rate
 
@@ -75,7 +75,7 @@ class Judged:
         return nearest_turn(self.estimate.film.angle, self.fitted[0])
 
     @cached_property
-    def missed(self) -> FloatArray:
+    def residuals(self) -> FloatArray:
         """Measured minus fitted in flight, (Q,): theta [rad], or omega [rad/s] of a table of it."""
         if self.estimate.film.quantity == "omega":
             return (self.estimate.film.values[0, :, 0] - self.fitted[1])[self.flying]
@@ -83,7 +83,7 @@ class Judged:
 
     @cached_property
     def own_noise(self) -> float:
-        """Noise that asks no equation: of points that of the bottle's length, else that of third differences."""
+        """Noise estimated without an equation: for points from the bottle's length, else from third differences."""
         film = self.estimate.film
         if film.quantity != "points":
             return third_differences(film.values[0][self.flying, 0])
@@ -91,8 +91,8 @@ class Judged:
 
     @cached_property
     def runs(self) -> float:
-        """Probability that chance leaves so few runs of one sign in the residuals (Wald and Wolfowitz)."""
-        signs = np.sign(self.missed - np.median(self.missed))
+        """Probability of so few runs of one sign in the residuals by chance (Wald and Wolfowitz)."""
+        signs = np.sign(self.residuals - np.median(self.residuals))
         signs = signs[signs != 0]
         up, down = int((signs > 0).sum()), int((signs < 0).sum())
         if min(up, down) < 3:
@@ -103,43 +103,43 @@ class Judged:
 
     @cached_property
     def noise(self) -> float:
-        """Noise with which the equation fits [m, rad or rad/s]."""
+        """Noise of the fit [m, rad or rad/s]."""
         return self.estimate.best["noise"]
 
     @property
     def discrepancy(self) -> float:
-        """Root mean square of what the equation leaves beyond the noise [degrees of theta, or rad/s]."""
+        """Root mean square of the residuals beyond the noise [degrees of theta, or rad/s]."""
         noise = self.own_noise
         if self.estimate.film.quantity == "points":
             noise *= math.sqrt(2.0) / self.estimate.best["length"]
-        rest = math.sqrt(max(0.0, float(np.mean(self.missed**2)) - noise**2))
-        return rest if self.estimate.film.quantity == "omega" else math.degrees(rest)
+        excess = math.sqrt(max(0.0, float(np.mean(self.residuals**2)) - noise**2))
+        return excess if self.estimate.film.quantity == "omega" else math.degrees(excess)
 
     @property
     def misfit(self) -> str:
         """The discrepancy as printed: a limit where the noise hides it (two deviations of a mean square)."""
-        left = float(np.mean(self.missed**2)) * 2.0 * math.sqrt(2.0 / max(len(self.missed), 1))
-        limit = math.sqrt(left) if self.estimate.film.quantity == "omega" else math.degrees(math.sqrt(left))
+        deviation = float(np.mean(self.residuals**2)) * 2.0 * math.sqrt(2.0 / max(len(self.residuals), 1))
+        limit = math.sqrt(deviation) if self.estimate.film.quantity == "omega" else math.degrees(math.sqrt(deviation))
         return f"{self.discrepancy:.2g}" if self.discrepancy >= limit else f"less than {limit:.1g}"
 
     @property
     def falls(self) -> bool:
-        """Whether the fitted flight falls about as things do; so where nothing says how it falls."""
+        """Whether the fitted flight falls at about g; true if nothing shows how it falls."""
         estimate = self.estimate
-        return not estimate.likelihood.two or abs(estimate.best["g"] / GRAVITY - 1.0) < FALL_ERROR
+        return not estimate.likelihood.planar or abs(estimate.best["g"] / GRAVITY - 1.0) < FALL_ERROR
 
     @property
     def explained(self) -> bool:
-        """Whether noise alone leaves residuals of this size and order, and no other equation is far likelier."""
-        if self.behind > OUTDONE or not self.falls:
+        """Whether noise alone explains the size and order of the residuals, and no other equation is far likelier."""
+        if self.log_deficit > OUTDONE or not self.falls:
             return False
-        spread = 5.0 / math.sqrt(max(4, len(self.missed)))
+        spread = 5.0 / math.sqrt(max(4, len(self.residuals)))
         return self.runs > 0.005 and self.noise <= max(self.own_noise, 1e-12) * (1.0 + spread)
 
     # ------------------------------------------------------------------ words
 
     def verdict(self, name: str) -> Verdict:
-        """Return whether a parameter is told by the data, bounded on one side, or not told."""
+        """Return whether the data determine a parameter, bound it on one side, or do neither."""
         low, high = self.estimate.interval(name)
         if name == "restitution":
             if high - low > 0.6 or (low < 0.02 and high > 0.98):
@@ -163,13 +163,14 @@ class Judged:
                 f"{film.label}: {estimate.solver}: the search did not end in {estimate.flights} flights: give more "
                 "--minutes or fewer --slices"
             )
-        if len(self.missed) < 8:
+        if len(self.residuals) < 8:
             clicked = int((estimate.flying & film.clicked.all(axis=0)).sum())
-            what = "click more" if clicked < 8 else "look for an origin or a stick that moves, or exchanged ends"
+            advice = "click more" if clicked < 8 else "look for an origin or a stick that moves, or exchanged ends"
             raise UnsoundError(
-                f"{film.label}: {len(self.missed)} of {clicked} frames clicked in flight fit it; 8 are needed: {what}"
+                f"{film.label}: {len(self.residuals)} of {clicked} frames clicked in flight fit it; 8 are needed: "
+                f"{advice}"
             )
-        if estimate.likelihood.two:
+        if estimate.likelihood.planar:
             if held.release is None and x[0] < film.t[0] + 2 * float(np.median(np.diff(film.t))):
                 raise UnsoundError(
                     f"{film.label}: the release at {x[0]:.4g} s lies within two frames of the first: click frames "
@@ -198,10 +199,10 @@ class Judged:
             self._check_rates()
 
     def _check_release(self) -> None:
-        """Refuse a release before which the bottle falls freely already."""
+        """Refuse a release before which the bottle already falls freely."""
         estimate = self.estimate
         release = estimate.interval("release")[0]
-        hand = before(estimate.film, release, estimate.likelihood.touch, max(self.own_noise, 1e-6))
+        hand = hand_share(estimate.film, release, estimate.likelihood.touch, max(self.own_noise, 1e-6))
         if hand is not None and hand.falls:
             raise UnsoundError(
                 f"{estimate.film.label}: {1e3 * hand.seconds:.0f} ms before the release at {release:.3f} s the bottle "
@@ -210,25 +211,29 @@ class Judged:
             )
 
     def _check_rates(self) -> None:
-        """Refuse an omega_0 that is not the slope of the clicked angle, and a plateau above it."""
+        """Refuse an omega_0 that is not the slope of the clicked angle, or a later rate above it."""
         estimate, film = self.estimate, self.estimate.film
         t, omega0, sign = film.t[self.flying], estimate.best["omega0"], math.copysign(1.0, estimate.best["omega0"])
         theta, fitted = self.theta[self.flying], self.fitted[0][self.flying]
-        size = math.sqrt(2.0) * self.noise / estimate.best["length"] if estimate.likelihood.two else self.noise
-        early = t <= max(float(t[0]) + 0.06, float(t[min(4, len(t) - 1)]))
-        late = t >= (t[0] + t[-1]) / 2
-        for which, words in ((early, "after the release"), (late, "in the second half")):
-            if which.sum() < 3:
+        noise = math.sqrt(2.0) * self.noise / estimate.best["length"] if estimate.likelihood.planar else self.noise
+        first_frames = t <= max(float(t[0]) + 0.06, float(t[min(4, len(t) - 1)]))
+        second_half = t >= (t[0] + t[-1]) / 2
+        for frames, period in ((first_frames, "after the release"), (second_half, "in the second half")):
+            if frames.sum() < 3:
                 continue
-            clock = t[which] - t[which].mean()
-            spread = size / math.sqrt(float(clock @ clock))
-            slope, meant = (float(clock @ y[which]) / float(clock @ clock) for y in (theta, fitted))
-            if abs(slope - meant) > 6 * spread + 0.1 * abs(omega0):
+            centred = t[frames] - t[frames].mean()
+            slope_error = noise / math.sqrt(float(centred @ centred))
+            slope, fitted_slope = (float(centred @ y[frames]) / float(centred @ centred) for y in (theta, fitted))
+            if abs(slope - fitted_slope) > 6 * slope_error + 0.1 * abs(omega0):
                 raise UnsoundError(
-                    f"{film.label}: {words} the clicked angle turns at {slope:.3g} rad/s, the fitted flight at "
-                    f"{meant:.3g}: click the frames from {t[which][0]:.3f} to {t[which][-1]:.3f} s again"
+                    f"{film.label}: {period} the clicked angle turns at {slope:.3g} rad/s, the fitted flight at "
+                    f"{fitted_slope:.3g}: click the frames from {t[frames][0]:.3f} to {t[frames][-1]:.3f} s again"
                 )
-            if which is late and sign * slope > abs(omega0) * 1.05 + 6 * spread and sign * meant < abs(omega0):
+            if (
+                frames is second_half
+                and sign * slope > abs(omega0) * 1.05 + 6 * slope_error
+                and sign * fitted_slope < abs(omega0)
+            ):
                 raise UnsoundError(
                     f"{film.label}: the bottle turns faster late ({slope:.3g} rad/s) than at its release "
                     f"({omega0:.3g} rad/s): click the frames around {estimate.best['release']:.3f} s again"
@@ -247,20 +252,20 @@ class Judged:
         for name in SHOWN:
             if name not in estimate.draws or (film.quantity == "omega" and name == "theta0"):
                 continue
-            if name == "touch" and not (estimate.touched and estimate.likelihood.two):
+            if name == "touch" and not (estimate.touched and estimate.likelihood.planar):
                 continue
             if name == "release" and estimate.likelihood.held.release is not None:
                 lines.append(f"  {name:12} {estimate.likelihood.held.release:.6g} s, held")
                 continue
             lines.append(f"  {name:12} {self.number(name)}{self._remark(name)}")
-        pair = (
+        correlation = (
             float(np.corrcoef(estimate.draws["gamma"], estimate.draws["release"])[0, 1])
             if estimate.held.release is None
             else 0.0
         )
-        if abs(pair) > 0.5 and estimate.likelihood.two:
-            lines.append(f"  correlation  gamma with release {pair:+.2f}: their intervals hang together")
-        return [*lines, f"  residuals    {self.words}"]
+        if abs(correlation) > 0.5 and estimate.likelihood.planar:
+            lines.append(f"  correlation  gamma with release {correlation:+.2f}: their intervals hang together")
+        return [*lines, f"  residuals    {self.conclusion}"]
 
     def number(self, name: str) -> str:
         """Return the median of a parameter, its interval and its unit."""
@@ -272,8 +277,8 @@ class Judged:
                 estimate.film.quantity
             ]
         width = factor * (high - low)
-        places = min(9, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
-        numbers = [f"{factor * value:.{places}f}" for value in (estimate.best[name], low, high)]
+        decimals = min(9, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
+        numbers = [f"{factor * value:.{decimals}f}" for value in (estimate.best[name], low, high)]
         return f"{numbers[0]} [{numbers[1]}, {numbers[2]}] {unit}".rstrip()
 
     def _remark(self, name: str) -> str:
@@ -285,14 +290,14 @@ class Judged:
         }[verdict]  # fmt: skip
 
     @property
-    def words(self) -> str:
-        """Whether the equation explains the flight, and what it leaves if not."""
+    def conclusion(self) -> str:
+        """Whether the equation explains the flight, and the misfit if not."""
         if self.explained:
             return "noise and nothing else: the equation explains the flight"
-        if self.behind > OUTDONE:
+        if self.log_deficit > OUTDONE:
             return (
                 f"the equation does not explain the film: it takes {int(self.flying.sum())} frames for flight, and "
-                f"another equation makes the film exp({self.behind:.0f}) times as likely; no interval is promised "
+                f"another equation makes the film exp({self.log_deficit:.0f}) times as likely; no interval is promised "
                 "to hold the truth"
             )
         if not self.falls:
@@ -310,56 +315,59 @@ class Judged:
         )
 
 
-def nearest_turn(angle: FloatArray, near: FloatArray) -> FloatArray:
-    """Return angles with so many turns added that they are nearest to others, NaN where missing."""
-    return np.asarray(angle + 2 * np.pi * np.rint((near - angle) / (2 * np.pi)))
+def nearest_turn(angle: FloatArray, reference: FloatArray) -> FloatArray:
+    """Return angles with whole turns added to be nearest to the reference, NaN where missing."""
+    return np.asarray(angle + 2 * np.pi * np.rint((reference - angle) / (2 * np.pi)))
 
 
-def ranked(all_: Sequence[Judged]) -> list[Judged]:
-    """Return the equations by their evidence, the best first, each with how far it is behind."""
-    best = max(judged.estimate.evidence for judged in all_)
+def ranked(assessments: Sequence[Assessment]) -> list[Assessment]:
+    """Return the equations by their evidence, the best first, each with its deficit."""
+    best = max(assessment.estimate.evidence for assessment in assessments)
     return sorted(
-        (replace(judged, behind=best - judged.estimate.evidence) for judged in all_), key=lambda judged: judged.behind
+        (replace(assessment, log_deficit=best - assessment.estimate.evidence) for assessment in assessments),
+        key=lambda assessment: assessment.log_deficit,
     )
 
 
-def compared(all_: Sequence[Judged]) -> str:
-    """Return which equation the film speaks for, in words."""
-    best, *others = ranked(all_)
-    equal = [o.estimate.solver for o in others if best.estimate.evidence - o.estimate.evidence <= INDISTINCT]
+def compared(assessments: Sequence[Assessment]) -> str:
+    """Return which equation the film favours, in words."""
+    best, *others = ranked(assessments)
+    equivalent = [fit.estimate.solver for fit in others if best.estimate.evidence - fit.estimate.evidence <= INDISTINCT]
     worse = [
-        f"{o.estimate.solver} by exp({best.estimate.evidence - o.estimate.evidence:.0f})"
-        for o in others
-        if best.estimate.evidence - o.estimate.evidence > INDISTINCT
+        f"{fit.estimate.solver} by exp({best.estimate.evidence - fit.estimate.evidence:.0f})"
+        for fit in others
+        if best.estimate.evidence - fit.estimate.evidence > INDISTINCT
     ]
-    words = [f"{best.estimate.solver}: {best.words}."]
-    if equal:
-        words.append(f"The film cannot tell it from {', '.join(equal)}.")
+    sentences = [f"{best.estimate.solver}: {best.conclusion}."]
+    if equivalent:
+        sentences.append(f"The film cannot tell it from {', '.join(equivalent)}.")
     if worse:
-        words.append(f"Its evidence exceeds that of {', '.join(worse)}.")
-    return " ".join(words)
+        sentences.append(f"Its evidence exceeds that of {', '.join(worse)}.")
+    return " ".join(sentences)
 
 
-def together(films: Sequence[Judged]) -> tuple[dict[str, FloatArray], str]:
-    """Return draws of gamma and e that several films of one bottle share, and in words whether they agree.
+def shared_draws(films: Sequence[Assessment]) -> tuple[dict[str, FloatArray], str]:
+    """Return draws of gamma and e shared by several films of one bottle, and in words whether these agree.
 
-    The films' posteriors of (gamma, e), which are densities smoothed by kernels, are multiplied: each has the same
-    flat prior, and all else is a film's own.
+    The films' posteriors of (gamma, e), as kernel density estimates, are multiplied: all have the same flat prior, and
+    all other parameters are a film's own.
     """
-    pairs = [np.array([judged.estimate.draws["gamma"], judged.estimate.draws["restitution"]]) for judged in films]
-    ends = np.array([[shortest(row, 0.999) for row in pair] for pair in pairs])
-    low, high = ends[:, :, 0].min(axis=0), ends[:, :, 1].max(axis=0)
+    pairs = [
+        np.array([assessment.estimate.draws["gamma"], assessment.estimate.draws["restitution"]]) for assessment in films
+    ]
+    intervals = np.array([[shortest(row, 0.999) for row in pair] for pair in pairs])
+    low, high = intervals[:, :, 0].min(axis=0), intervals[:, :, 1].max(axis=0)
     axes = [np.linspace(low[k], high[k], 161) for k in range(2)]
     mesh = np.array([grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")])
-    total = np.zeros(mesh.shape[1])
+    log_product = np.zeros(mesh.shape[1])
     for pair in pairs:
-        total += np.log(gaussian_kde(pair[:, ::4])(mesh) + 1e-12)
-    chance = np.exp(total - total.max())
+        log_product += np.log(gaussian_kde(pair[:, ::4])(mesh) + 1e-12)
+    prob = np.exp(log_product - log_product.max())
     rng = np.random.default_rng(2)
-    picked = mesh[:, rng.choice(len(chance), DRAWS, p=chance / chance.sum())]
+    drawn = mesh[:, rng.choice(len(prob), DRAWS, p=prob / prob.sum())]
     step = np.array([[axis[1] - axis[0]] for axis in axes])
-    low_high = [shortest(pair[0], 0.95) for pair in pairs]
-    apart = max(interval[0] for interval in low_high) > min(interval[1] for interval in low_high)
-    words = "their intervals of gamma do not meet: not one bottle, or not this equation" if apart else "the films agree"
-    shared = picked + (rng.random(picked.shape) - 0.5) * step
-    return {"gamma": shared[0], "restitution": np.clip(shared[1], 0.0, 1.0)}, words
+    gamma_intervals = [shortest(pair[0], 0.95) for pair in pairs]
+    differ = max(interval[0] for interval in gamma_intervals) > min(interval[1] for interval in gamma_intervals)
+    note = "their intervals of gamma do not meet: not one bottle, or not this equation" if differ else "the films agree"
+    shared = drawn + (rng.random(drawn.shape) - 0.5) * step
+    return {"gamma": shared[0], "restitution": np.clip(shared[1], 0.0, 1.0)}, note

@@ -3,7 +3,7 @@
     cap(t)  = p_0 + v_0 tau + a tau^2/2 - l R u        u = (sin theta, -cos theta), tau = t - t_r
     base(t) = cap(t) + l u                             R = r_CM / L and theta by the equation (``curves``)
 
-Every click of two coordinates misses by a normal deviate of variance v, but for a share of bad clicks, which may lie
+The error of a click has variance v in both coordinates and is normal, but for a share of bad clicks, which may lie
 anywhere in the picture. In flight v = sigma^2. Before the release a hand adds motions to C_M and to theta (``hand``),
 which are fitted, since what a hand does in one frame it does in the next; what they do not describe has the size A,
 and after the touch the table takes the velocity:
@@ -12,8 +12,8 @@ and after the touch the table takes the velocity:
 
 never beyond the picture.
 
-So frames in the hand and on the table count for nothing but for this: release and touch do not jump. A table of theta
-or omega alone has rows of one coordinate, no hand and no table.
+So frames in the hand and on the table serve one purpose only: release and touch do not jump. A table of theta or omega
+alone has rows of one coordinate, no hand and no table.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.film.curves import Curve
-from flipproof.film.hand import APART, FIRST, KINDS, LIFT, PULL, Rest, motions
-from flipproof.film.kernel.scoring import ended, points, sums, variances
+from flipproof.film.hand import FIRST, KINDS, KNOT_SPACING, LIFT, PULL, Rest, motions
+from flipproof.film.kernel.scoring import points, scoring_sums, touch_costs, variances
 from slicemodel.trajectory import FloatArray
 
 GRAVITY: Final = 9.81
-"""What the picture's gravity is held against [m/s^2]."""
+"""Gravity with which the picture's is compared [m/s^2]."""
 
 BAD: Final = 0.01
 """Share of clicks that may lie anywhere."""
 
 TIGHT: Final = 1e-6
-"""Standard deviation of what is held."""
+"""Standard deviation of a parameter that is held."""
 
 TOUCH: Final = (1.0, 3.0, 10.0)
 """Velocities that a table may take [m/s]; the likeliest is used."""
@@ -47,14 +47,14 @@ PLACED: Final = ("release", "theta0", "omega0", "x0", "y0", "vx", "vy", "ax", "a
 SPIN: Final = ("release", "theta0", "omega0", "log_noise")
 """Inner parameters of points and of a table of theta or omega; gamma / |omega_0| and e are the outer ones."""
 
-LOOSE: Final = np.array([1.0, 3.0, 30.0, 3.0, 3.0, 10.0, 10.0, 10.0, 10.0, 1.0])
-"""What is known of ``PLACED`` without any click, as deviations; SI units.
+PRIOR_DEVIATIONS: Final = np.array([1.0, 3.0, 30.0, 3.0, 3.0, 10.0, 10.0, 10.0, 10.0, 1.0])
+"""Prior standard deviations of ``PLACED``; SI units.
 
-Where every click is taken for a bad one nothing else limits the integral of the posterior density.
+Where every click is taken for a bad one, nothing else limits the integral of the posterior density.
 """
 
-RELEASED: Final = slice(len(PLACED), len(PLACED) + 3)
-"""Which of them are the hand's accelerations at the release."""
+AT_RELEASE: Final = slice(len(PLACED), len(PLACED) + 3)
+"""The hand's accelerations at the release among the inner parameters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,7 +78,7 @@ class Film:
     notes: tuple[str, ...] = ()
 
     def names(self, count: int) -> tuple[str, ...]:
-        """Return the names of the inner parameters, with so many motions of a hand."""
+        """Return the names of the inner parameters, with ``count`` motions of a hand."""
         if self.quantity != "points":
             return SPIN
         hand = (f"hand_{k}_{name}" for k in range(count) for name in ("x", "y", "theta"))
@@ -92,12 +92,12 @@ class Film:
     @property
     def area(self) -> float:
         """Size of the range in which a bad click lies: [m^2], or [rad] or [rad/s]."""
-        seen = self.values.reshape(-1, self.values.shape[2])
-        span = np.nanmax(seen, axis=0) - np.nanmin(seen, axis=0)
+        values = self.values.reshape(-1, self.values.shape[2])
+        span = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)
         return float(np.prod(np.maximum(span, 1e-3 * max(1e-6, float(span.max())))))
 
     def scatter(self, frames: NDArray[np.bool_] | slice = slice(None)) -> float:
-        """Return the noise of a click by the scatter of the bottle's clicked length, which needs no equation [m]."""
+        """Return the noise of a click from the scatter of the bottle's clicked length, without an equation [m]."""
         length = np.hypot(*(self.values[1] - self.values[0])[frames].T)
         return 1.4826 * float(np.nanmedian(np.abs(length - np.nanmedian(length)))) / float(np.sqrt(2.0))
 
@@ -112,12 +112,12 @@ class Film:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Held:
-    """What is known beforehand, and is held.
+    """What is known beforehand and held fixed.
 
     Parameters
     ----------
     release, touch : float or None - [s] by the film's clock
-    table : float or None - y of the table in the picture [m]: the touch is when an end comes down to it
+    table : float or None - y of the table in the picture [m]: the touch is when an end reaches it
     tilt : bool - the picture's vertical is true
     scale : bool - gravity in the picture is 9.81 m/s^2
     noise : float or None - standard deviation of one coordinate
@@ -149,7 +149,7 @@ class Mode:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """What one curve allows: a mode for every kind of hand, the likeliest first."""
+    """The modes under one curve: one for every kind of hand, the likeliest first."""
 
     modes: tuple[Mode, ...]
 
@@ -184,30 +184,30 @@ class Likelihood:
     ) -> None:
         """Take the touch, a guess of the noise, the velocity the table takes, the hand's motions and their rest."""
         self.film, self.held, self.touch, self.noise, self.speed, self.rest = film, held, touch, noise, speed, rest
-        self.area, self.seen = film.area, film.clicked
-        self.two = film.values.shape[2] == 2
+        self.area, self.observed = film.area, film.clicked
+        self.planar = film.values.shape[2] == 2
         self.count, self.names, self.hands = count, film.names(count), motions(count)
         self.index = {name: k for k, name in enumerate(self.names)}
         self.log_bad = float(np.log(BAD / self.area))
         self.expected, self.stiffness = self._priors()
-        placed = LOOSE if self.two else LOOSE[:3]
-        self.loose = np.diag(np.pad(placed**-2.0, (0, len(self.names) - len(placed))))
+        deviations = PRIOR_DEVIATIONS if self.planar else PRIOR_DEVIATIONS[:3]
+        self.prior_precision = np.diag(np.pad(deviations**-2.0, (0, len(self.names) - len(deviations))))
         # Ten that place the flight and three accelerations of a hand; its other motions follow their priors.
-        fixed = [held.release is not None, self.two and held.tilt, self.two and held.scale]
-        self.degrees = (13 if self.two else 3) - sum(fixed)
+        fixed = [held.release is not None, self.planar and held.tilt, self.planar and held.scale]
+        self.dof = (13 if self.planar else 3) - sum(fixed)
 
-    def but(self, **changed: Any) -> Likelihood:
+    def replaced(self, **changed: Any) -> Likelihood:
         """Return the same with another film, touch, speed, number of motions or rest."""
-        known = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "speed", "count", "rest")}
-        return Likelihood(**known | changed)
+        arguments = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "speed", "count", "rest")}
+        return Likelihood(**arguments | changed)
 
     def _priors(self) -> tuple[FloatArray, FloatArray]:
-        """Return what priors expect (K,), and for every kind of hand their inverse variances, 0 where there is none."""
+        """Return the priors' means (K,), and for every kind of hand their inverse variances, 0 where there is none."""
         held, noise = self.held, self.noise if self.held.noise is None else self.held.noise
         priors = {"log_noise": (float(np.log(noise)), 3.0 if held.noise is None else TIGHT)}
         if held.release is not None:
             priors["release"] = held.release, TIGHT
-        if self.two:
+        if self.planar:
             priors["log_hand"] = float(np.log(self.rest.size)), self.rest.deviation
             hand = [name for name in self.names if name.startswith("hand_")]
             priors |= {name: (0.0, size) for name, size in zip(hand, PULL * self.count, strict=True)}
@@ -220,22 +220,22 @@ class Likelihood:
             expected[self.index[name]], stiffness[self.index[name]] = value, deviation**-2
         if self.count == 1:
             return expected, stiffness[None]
-        expected[RELEASED] = LIFT
+        expected[AT_RELEASE] = LIFT
         kinds = np.tile(stiffness, (len(KINDS), 1))
-        kinds[:, RELEASED] = np.array(KINDS) ** -2
+        kinds[:, AT_RELEASE] = np.array(KINDS) ** -2
         return expected, kinds
 
     # ------------------------------------------------------------------ the model
 
     def model(self, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the values that were meant, (B, P, D), and their slopes by the inner parameters, (B, P, D, K)."""
+        """Return the predicted values, (B, P, D), and their slopes by the inner parameters, (B, P, D, K)."""
         film, n = self.film, self.index
         theta0, omega0 = x[1], x[2]
         tau = film.t - x[0]
-        tilt = np.arctan2(x[n["ax"]], -x[n["ay"]]) if self.two else 0.0
+        tilt = np.arctan2(x[n["ax"]], -x[n["ay"]]) if self.planar else 0.0
         turning = curve.at(abs(omega0) * tau, omega0, theta0 - tilt)
-        if self.two:
-            values, slopes = points(turning, film.t, x, self.hands, APART)
+        if self.planar:
+            values, slopes = points(turning, film.t, x, self.hands, KNOT_SPACING)
             return values, slopes
         f, w, _, _, f_omega, _, f_theta, _ = turning
         sign = np.sign(omega0)
@@ -245,70 +245,74 @@ class Likelihood:
             turn = np.array([-omega, 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0])
             slopes[0, :, 0, :3] = turn.T
             return theta[None, :, None], slopes
-        bend = np.gradient(omega, film.t) if len(tau) > 1 else np.zeros_like(omega)
-        slopes[0, :, 0, 0], slopes[0, :, 0, 2] = -bend, w + bend * tau / omega0
+        acceleration = np.gradient(omega, film.t) if len(tau) > 1 else np.zeros_like(omega)
+        slopes[0, :, 0, 0], slopes[0, :, 0, 2] = -acceleration, w + acceleration * tau / omega0
         return omega[None, :, None], slopes
 
     def variance(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the variance of one coordinate (P,), and its slopes by the inner parameters (P, K)."""
         t = self.film.t
-        if not self.two:
+        if not self.planar:
             slopes = np.zeros((len(t), len(x)))
             slopes[:, -1] = 2 * np.exp(2 * x[-1])
             return np.full(len(t), np.exp(2 * x[-1])), slopes
-        most, rest = self.area / (2 * np.pi), self.rest
-        variance, slopes = variances(t, x, self.touch, self.speed, most, rest.power, rest.least)
+        bound, rest = self.area / (2 * np.pi), self.rest
+        variance, slopes = variances(t, x, self.touch, self.speed, bound, rest.power, rest.floor)
         return variance, slopes
 
     # ------------------------------------------------------------------ densities
 
-    def pieces(self, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return of every value its cost (B, P), the probability that it is no bad click, and what it misses by."""
+    def per_click(self, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the cost of every value (B, P), the probability that it is no bad click, and its residual."""
         values, _ = self.model(curve, x)
         variance, _ = self.variance(x)
         return self._density(self.film.values - values, variance)
 
-    def touches(self, curve: Curve, x: FloatArray, times: FloatArray, speed: float) -> FloatArray:
-        """Return the cost of all clicks had the touch been at each of some times, shape (len(times),)."""
+    def costs_of_touches(self, curve: Curve, x: FloatArray, times: FloatArray, speed: float) -> FloatArray:
+        """Return the cost of all clicks if the touch had been at each of some times, shape (len(times),)."""
         values, _ = self.model(curve, x)
-        t, most = self.film.t, self.area / (2 * np.pi)
-        variance, _ = variances(t, x, np.inf, 0.0, most, self.rest.power, self.rest.least)
-        squares = (np.where(self.seen[:, :, None], self.film.values - values, 0.0) ** 2).sum(axis=2)
-        return np.asarray(ended(squares, self.seen, variance, t, times, speed, most, np.log1p(-BAD), self.log_bad))
+        t, bound = self.film.t, self.area / (2 * np.pi)
+        variance, _ = variances(t, x, np.inf, 0.0, bound, self.rest.power, self.rest.floor)
+        squares = (np.where(self.observed[:, :, None], self.film.values - values, 0.0) ** 2).sum(axis=2)
+        return np.asarray(
+            touch_costs(squares, self.observed, variance, t, times, speed, bound, np.log1p(-BAD), self.log_bad)
+        )
 
-    def _density(self, missed: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        missed = np.where(self.seen[:, :, None], missed, 0.0)
-        power = missed.shape[2] / 2
-        q = (missed**2).sum(axis=2) / (2 * variance)
-        good = np.log1p(-BAD) - q - power * np.log(2 * np.pi * variance)
-        both = np.logaddexp(good, self.log_bad)
-        return np.where(self.seen, -both, 0.0), np.where(self.seen, np.exp(good - both), 0.0), missed
+    def _density(self, residuals: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        residuals = np.where(self.observed[:, :, None], residuals, 0.0)
+        power = residuals.shape[2] / 2
+        half_chi2 = (residuals**2).sum(axis=2) / (2 * variance)
+        good = np.log1p(-BAD) - half_chi2 - power * np.log(2 * np.pi * variance)
+        total = np.logaddexp(good, self.log_bad)
+        return np.where(self.observed, -total, 0.0), np.where(self.observed, np.exp(good - total), 0.0), residuals
 
     def terms(self, curve: Curve, x: FloatArray, kind: int = 0) -> tuple[float, FloatArray, FloatArray]:
         """Return the cost for a kind of hand, its gradient and Fisher's information."""
         values, slopes = self.model(curve, x)
         variance, dv = self.variance(x)
-        missed = self.film.values - values
-        cost, gradient, information = sums(missed, self.seen, slopes, variance, dv, np.log1p(-BAD), self.log_bad)
+        residuals = self.film.values - values
+        cost, gradient, information = scoring_sums(
+            residuals, self.observed, slopes, variance, dv, np.log1p(-BAD), self.log_bad
+        )
         return cost + self._add_priors(x, self.stiffness[kind], gradient, information), gradient, information
 
     def _add_priors(self, x: FloatArray, stiffness: FloatArray, gradient: FloatArray, information: FloatArray) -> float:
-        """Add what is held, and weak priors that keep parameters in reach, to both; return their cost."""
-        away = x - self.expected
-        pull = stiffness * away
-        gradient += pull
+        """Add held values and weak priors, which keep parameters in reach, to both; return their cost."""
+        deviation = x - self.expected
+        prior_gradient = stiffness * deviation
+        gradient += prior_gradient
         information.flat[:: len(x) + 1] += stiffness
-        cost = 0.5 * float(away @ pull)
-        if self.two and self.held.scale:
-            down = float(np.hypot(x[7], x[8]))
-            row = x[7:9] / (down * TIGHT)
-            cost += 0.5 * ((down - GRAVITY) / TIGHT) ** 2
-            gradient[7:9] += (down - GRAVITY) / TIGHT * row
-            information[7:9, 7:9] += np.outer(row, row)
-        # The integral over what else is fitted is the larger the larger the noise: the mode is that of the noise alone.
-        at = self.index["log_noise"]
-        gradient[at] -= self.degrees
-        return float(cost - self.degrees * x[at])
+        cost = 0.5 * float(deviation @ prior_gradient)
+        if self.planar and self.held.scale:
+            gravity = float(np.hypot(x[7], x[8]))
+            direction = x[7:9] / (gravity * TIGHT)
+            cost += 0.5 * ((gravity - GRAVITY) / TIGHT) ** 2
+            gradient[7:9] += (gravity - GRAVITY) / TIGHT * direction
+            information[7:9, 7:9] += np.outer(direction, direction)
+        # The integral over all else that is fitted grows with the noise: the mode is that of the noise alone.
+        k = self.index["log_noise"]
+        gradient[k] -= self.dof
+        return float(cost - self.dof * x[k])
 
     def fitted(self, curve: Curve, x: FloatArray, steps: int = 30) -> Fit:
         """Return the modes near ``x``, by scoring with Levenberg's damping."""
@@ -323,19 +327,19 @@ class Likelihood:
             damped.flat[:: len(x) + 1] += damping * (np.diag(hessian) + 1e-12)
             step = -np.linalg.solve(damped, gradient)
             trial = x + step
-            sound = trial[2] * x[2] > 0 and abs(step[self.index["log_noise"]]) < 5
-            new = self.terms(curve, trial, kind) if sound else None
-            if new is None or not new[0] <= cost:
+            valid = trial[2] * x[2] > 0 and abs(step[self.index["log_noise"]]) < 5
+            trial_terms = self.terms(curve, trial, kind) if valid else None
+            if trial_terms is None or not trial_terms[0] <= cost:
                 damping *= 10
                 if damping > 1e6:
                     break
                 continue
-            gain = cost - new[0]
-            x, (cost, gradient, hessian), damping = trial, new, max(damping / 5, 1e-9)
+            gain = cost - trial_terms[0]
+            x, (cost, gradient, hessian), damping = trial, trial_terms, max(damping / 5, 1e-9)
             if gain < 1e-3:
                 break
-        _, size = np.linalg.slogdet(hessian + self.loose)
-        evidence = -cost - self.degrees * x[self.index["log_noise"]] - 0.5 * size + 0.5 * len(x) * np.log(2 * np.pi)
+        _, log_det = np.linalg.slogdet(hessian + self.prior_precision)
+        evidence = -cost - self.dof * x[self.index["log_noise"]] - 0.5 * log_det + 0.5 * len(x) * np.log(2 * np.pi)
         if self.count > 1:  # priors that differ by kind, with their norm
-            evidence += 0.5 * np.log(self.stiffness[kind, RELEASED]).sum()
+            evidence += 0.5 * np.log(self.stiffness[kind, AT_RELEASE]).sum()
         return Mode(x, cost, hessian, float(evidence))

@@ -1,4 +1,4 @@
-"""A measured flight beside the solvers of a report, fitted to it by the estimate of ``track`` and ``fit``."""
+"""A measured flight beside the solvers of a report, which are fitted to it as by ``track`` and ``fit``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from flipproof.film.clip import read_table
 from flipproof.film.estimate import estimate
-from flipproof.film.judge import Judged, compared, ranked
+from flipproof.film.judge import Assessment, compared, ranked
 from flipproof.film.likelihood import Film
 from flipproof.film.page import figure_film
 from flipproof.frame.chapter import Ask, Call, Chapter, Part, Study
@@ -29,15 +29,15 @@ class Measured:
     """A film and its fits by the solvers of ``HELD``, the best first."""
 
     film: Film
-    fits: tuple[Judged, ...]
+    fits: tuple[Assessment, ...]
 
     @property
     def words(self) -> str:
-        """What the measurement says, in plain words."""
+        """The result of the measurement in words."""
         return compared(self.fits)
 
     def findings(self) -> Iterator[Finding]:
-        """Yield one observation for each fit: what it leaves beyond the noise."""
+        """Yield one observation per fit: its residual beyond the noise."""
         unit = "rad/s" if self.film.quantity == "omega" else "degrees"
         for fit in self.fits:
             solver = fit.estimate.solver
@@ -47,7 +47,7 @@ class Measured:
             yield observed(f"measured-fit-{solver}", title, fit.discrepancy, unit, note)
 
     def exhibit(self) -> Exhibit:
-        """Return the figure: the measurement under the fitted solvers, and what is left of it."""
+        """Return the figure: the measurement under the fitted solvers, and the residuals."""
         t, best = self.film.t, self.fits[0]
         omega = self.film.quantity == "omega"
         unit = "rad/s" if omega else "rad"
@@ -73,14 +73,14 @@ def read_measured(path: Path) -> Film:
 
 
 def hold(film: Film, scenario: Scenario, tick: Callable[[int], object] = lambda _: None) -> Measured:
-    """Return a film fitted by the solvers of ``HELD``; an unsound estimate by the nearest is refused."""
-    fits = ranked([Judged(estimate(film, scenario, name, tick=tick)) for name in HELD])
+    """Return a film fitted by the solvers of ``HELD``; refused if the best estimate is unsound."""
+    fits = ranked([Assessment(estimate(film, scenario, name, tick=tick)) for name in HELD])
     fits[0].check()
     return Measured(film=film, fits=tuple(fits))
 
 
 def part_measured(film: Film) -> Part:
-    """Return the part of a report that holds a measurement beside its solvers; it stands before the others."""
+    """Return the part of a report that compares a measurement with its solvers; it comes before the others."""
 
     def study(ask: Ask) -> Study[Measured]:
         call = Call(hold, (film, ask.scenario), "fits of the measurement")

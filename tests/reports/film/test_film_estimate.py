@@ -9,8 +9,8 @@ import pytest
 from flipproof.cli.main import main
 from flipproof.film.clip import SCHEMA
 from flipproof.film.estimate import NoFlightError, estimate, exchange_gain, exchanged, settle, shortest
-from flipproof.film.fall import before
-from flipproof.film.judge import EXCHANGED, Judged, UnsoundError, together
+from flipproof.film.fall import hand_share
+from flipproof.film.judge import EXCHANGED, Assessment, UnsoundError, shared_draws
 from flipproof.film.likelihood import Film, Held
 from flipproof.film.measured import hold, read_measured
 from flipproof.output.tables import read_curve
@@ -39,7 +39,7 @@ def written(path, made):
 
 
 def judged_of(made, filling=0.5):
-    return made, Judged(estimate(film_of(made), replace(THROW, water_mass=filling)))
+    return made, Assessment(estimate(film_of(made), replace(THROW, water_mass=filling)))
 
 
 @pytest.fixture(scope="module")
@@ -207,7 +207,7 @@ def test_another_equation_is_not_said_to_explain(eq8):
     _, judged = eq8
     assert not judged.explained
     assert judged.discrepancy > 0.03
-    assert "does not explain" in judged.words
+    assert "does not explain" in judged.conclusion
 
 
 @pytest.mark.slow
@@ -215,7 +215,7 @@ def test_another_equation_in_another_film_is_not_said_to_explain():
     _, judged = judged_of(clip(6, fps=120, model="eq8", noise=0.5e-3))
     assert not judged.explained
     assert judged.discrepancy > 0.05
-    assert "does not explain" in judged.words
+    assert "does not explain" in judged.conclusion
 
 
 def test_ice_tells_nothing_of_drag():
@@ -223,7 +223,7 @@ def test_ice_tells_nothing_of_drag():
     turning = np.linspace(0.0, 8.0, len(made.t))
     film = Film(label="ice", t=made.t, values=turning[None, :, None], quantity="theta", lines=np.arange(len(made.t)))
     film = replace(film, values=film.values + np.random.default_rng(0).normal(0, 3e-3, film.values.shape))
-    judged = Judged(estimate(film, replace(THROW, frozen=True)))
+    judged = Assessment(estimate(film, replace(THROW, frozen=True)))
     assert judged.verdict("gamma") == judged.verdict("restitution") == "cannot tell"
 
 
@@ -260,16 +260,16 @@ def test_a_release_within_free_flight_is_seen_without_an_equation():
     for seed in range(4):
         made = clip([14, seed], fps=240, noise=0.5e-3, tilt=3.0, bad=1)
         film, release, touch = film_of(made), made.truth["release"], made.truth["touch"]
-        assert not before(film, release - 2e-3, touch, 0.5e-3).falls
-        assert before(film, release + 0.12, touch, 0.5e-3).falls
-    assert before(film, touch - 0.01, touch, 0.5e-3) is None
+        assert not hand_share(film, release - 2e-3, touch, 0.5e-3).falls
+        assert hand_share(film, release + 0.12, touch, 0.5e-3).falls
+    assert hand_share(film, touch - 0.01, touch, 0.5e-3) is None
 
 
 def test_an_estimate_that_begins_in_free_flight_is_refused(quick):
     one = quick[1].estimate
     moved = replace(one, draws=one.draws | {"release": one.draws["release"] + 0.12})
     with pytest.raises(UnsoundError, match="falls freely by its clicks alone: the flight begins earlier"):
-        Judged(moved)._check_release()
+        Assessment(moved)._check_release()
 
 
 @pytest.mark.parametrize("which", ["poor", "eq8"])
@@ -278,7 +278,7 @@ def test_exchanged_ends_are_refused_whatever_flight_is_found_in_them(request, wh
     one = request.getfixturevalue(which)[1].estimate
     assert exchange_gain(one, EXCHANGED) < -EXCHANGED
     with pytest.raises((UnsoundError, NoFlightError), match="exchanged"):
-        Judged(estimate(exchanged(one.film), THROW)).check()
+        Assessment(estimate(exchanged(one.film), THROW)).check()
 
 
 def test_a_known_table_is_where_the_flight_ends(bottles):
@@ -286,10 +286,10 @@ def test_a_known_table_is_where_the_flight_ends(bottles):
     values, _ = one.likelihood.model(one.curve, one.fit.x)
     k = int(np.flatnonzero(one.flying)[-2])
     height = float(values[:, k, 1].min())
-    held = one.likelihood.but(held=Held(table=height))
+    held = one.likelihood.replaced(held=Held(table=height))
     assert settle(held, one.curve, one.fit.x).touch == pytest.approx(one.film.t[k], abs=2e-3)
     with pytest.raises(ValueError, match="table_height = -50 m: the bottle never comes down to it"):
-        settle(one.likelihood.but(held=Held(table=-50.0)), one.curve, one.fit.x)
+        settle(one.likelihood.replaced(held=Held(table=-50.0)), one.curve, one.fit.x)
 
 
 @pytest.mark.parametrize(
@@ -300,7 +300,7 @@ def test_a_known_table_is_where_the_flight_ends(bottles):
     ],
 )
 def test_an_angle_whose_slope_contradicts_the_fit_is_refused(bottles, changed, words):
-    one = Judged(bottles[0][1].estimate)
+    one = Assessment(bottles[0][1].estimate)
     one.check()
     one.__dict__["theta"] = changed(one.estimate.film.t, one.theta, one.estimate.best["omega0"])
     with pytest.raises(UnsoundError, match=words):
@@ -324,7 +324,9 @@ def test_lengths_in_another_unit_are_refused():
 
 
 def test_a_grid_without_any_likelihood_is_refused(monkeypatch):
-    monkeypatch.setattr("flipproof.film.estimate.Grid.masses", property(lambda grid: np.full(len(grid.nodes), -np.inf)))
+    monkeypatch.setattr(
+        "flipproof.film.estimate.Grid.log_masses", property(lambda grid: np.full(len(grid.nodes), -np.inf))
+    )
     with pytest.raises(NoFlightError, match="no flight fits the clicks"):
         estimate(film_of(clip(3, fps=30)), THROW)
 
@@ -370,7 +372,7 @@ def test_every_door_gives_the_same_numbers(tmp_path, poor, capsys, monkeypatch):
 
 def test_films_of_one_bottle_share_drag_and_restitution(bottles):
     judged = [each for _, each in bottles]
-    draws, words = together(judged)
+    draws, words = shared_draws(judged)
     assert words == "the films agree"
     low, high = shortest(draws["gamma"], 0.999)
     assert low <= 6.0 <= high
@@ -385,7 +387,7 @@ def test_a_spoiled_film_is_estimated_or_refused(seeds):
         film = film_simulator.spoiled(np.random.default_rng(seed), film_of(made))
         message, draws = "", {}
         try:
-            judged = Judged(estimate(film, THROW))
+            judged = Assessment(estimate(film, THROW))
             judged.check()
             draws = judged.estimate.draws
         except ValueError as error:  # NoFlightError and UnsoundError are
