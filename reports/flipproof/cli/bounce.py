@@ -28,7 +28,7 @@ def add_bounce(commands: Any) -> None:
 
 
 def command_bounce(options: argparse.Namespace) -> int:
-    """Measure, print a line a property, write what was asked for; the status is 0 whatever was remarked."""
+    """Measure, print one line per property, write the requested files; the status is 0 whatever the remarks."""
     from flipproof.bounce.passport import Passport, measure
     from flipproof.bounce.specs import load
 

@@ -120,11 +120,11 @@ def command_check(options: argparse.Namespace) -> int:
 def _groups(text: str) -> tuple[str, ...]:
     from flipproof.check.throw import groups
 
-    given, available = [word.strip() for word in text.split(",") if word.strip()], groups()
-    unknown = [word for word in given if word not in available]
-    if unknown or not given:
+    requested, available = [word.strip() for word in text.split(",") if word.strip()], groups()
+    unknown = [word for word in requested if word not in available]
+    if unknown or not requested:
         raise argparse.ArgumentTypeError(f"{', '.join(unknown) or text!r} is not among {', '.join(available)}")
-    return tuple(group for group in available if group in given)
+    return tuple(group for group in available if group in requested)
 
 
 def add_compare(commands: Any) -> None:
@@ -166,16 +166,18 @@ def _names(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
 
 
-def _of_any_system(options: argparse.Namespace) -> bool:
+def _compares_any_system(options: argparse.Namespace) -> bool:
     """Return whether two files are to be compared that need not be throws of a bottle."""
-    asked = options.columns or options.twin or options.twin_of_b or options.from_twins or options.plot or options.shift
+    for_files = (
+        options.columns or options.twin or options.twin_of_b or options.from_twins or options.plot or options.shift
+    )
     paths = Path(options.first), Path(options.second)
     if not all(path.is_file() for path in paths):
-        if asked:
+        if for_files:
             missing = next(path for path in paths if not path.is_file())
             raise ValueError(f"{missing} is no file: --columns, --twin, --from-twins, --shift and --plot compare files")
         return False
-    if asked or any(path.suffix in (".parquet", ".npz", ".nc") for path in paths):
+    if for_files or any(path.suffix in (".parquet", ".npz", ".nc") for path in paths):
         return True
     from flipproof.output.tables import QUANTITIES, read_cells
 
@@ -213,7 +215,7 @@ def _compare_curves(options: argparse.Namespace) -> int:
 
 def command_compare(options: argparse.Namespace) -> int:
     """Compare two solvers or files and print the differences; return 1 if they exceed the tolerance."""
-    if _of_any_system(options):
+    if _compares_any_system(options):
         return _compare_curves(options)
     if options.junit and options.tolerance is None:
         raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
@@ -235,18 +237,18 @@ def command_compare(options: argparse.Namespace) -> int:
         run, seconds = solve_timed(find(name).name, scenario)
         if len(run.t) < 2:
             raise ValueError(f"{name} has nothing to compare on this throw: {run.status}: {run.message}")
-        words = doubt(run, seconds, TRUSTED if options.tolerance is None else options.tolerance)
-        return replace(Curve.of(run), notes=(words,) if words else ())
+        warning = doubt(run, seconds, TRUSTED if options.tolerance is None else options.tolerance)
+        return replace(Curve.of(run), notes=(warning,) if warning else ())
 
     comparison = compare(load(options.first), load(options.second))
     print(inert(table(comparison)))
     allowed = math.inf if options.tolerance is None else options.tolerance
-    held = claims(comparison, allowed)
-    write_json(options.json, {**comparison.to_mapping(), "findings": [finding.to_mapping() for finding in held]})
+    findings = claims(comparison, allowed)
+    write_json(options.json, {**comparison.to_mapping(), "findings": [finding.to_mapping() for finding in findings]})
     if options.tolerance is None:
         return 0
-    write_junit(options.junit, held, "flipproof compare")
-    first = held[0]
-    word = "FAIL" if first.failed else "PASS"
-    print(f"{word}  {first.title}: {first.value:.6g} {first.unit}, tolerance {options.tolerance:g} ({first.note})")
+    write_junit(options.junit, findings, "flipproof compare")
+    first = findings[0]
+    status = "FAIL" if first.failed else "PASS"
+    print(f"{status}  {first.title}: {first.value:.6g} {first.unit}, tolerance {options.tolerance:g} ({first.note})")
     return 1 if first.failed else 0

@@ -80,16 +80,16 @@ class Matched(NamedTuple):
         text = f"events: {len(self.pairs)} in both"
         if len(self.pairs):
             text += f", at most {np.abs(self.shift).max():.3g} apart"
-        counts = [int((self.lone[:, 1] == which).sum()) for which in (0, 1)]
+        counts = [int((self.lone[:, 1] == run).sum()) for run in (0, 1)]
         lines = [f"{text}; {counts[0]} in the first alone, {counts[1]} in the second alone"]
         if parted is None:
             return lines
-        earlier = [(time, f"that only the {('first', 'second')[int(which)]} run has") for time, which in self.lone]
+        earlier = [(time, f"that only the {('first', 'second')[int(run)]} run has") for time, run in self.lone]
         earlier += [(min(pair), f"that is {abs(pair[1] - pair[0]):.3g} apart in the two") for pair in self.pairs]
         earlier = [event for event in earlier if event[0] <= parted]
         if earlier:
-            time, which = max(earlier)
-            lines.append(f"they part at t = {parted:.6g}, after the event at t = {time:.6g} {which}")
+            time, difference = max(earlier)
+            lines.append(f"they part at t = {parted:.6g}, after the event at t = {time:.6g} {difference}")
         return lines
 
     def to_mapping(self) -> dict[str, object]:

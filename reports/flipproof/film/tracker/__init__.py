@@ -1,1 +1,1 @@
-"""A bench for one's own videos: what the Tracker video tool exports, read, judged and turned into theta and omega."""
+"""For one's own videos: exports of the Tracker video tool, read, checked and turned into theta and omega."""

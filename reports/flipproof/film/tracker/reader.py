@@ -9,8 +9,8 @@ the delimiters at the ends of lines):
     0.0|0.1204|1.31|0.3978|1.334
     4.167E-3|0.1219|1.319|||        a point that was not tracked: its cells are empty
 
-A file is accepted only if every row has the same number of cells: a row that lost one would put every number after it
-into the wrong column.
+A file is accepted only if every row has the same number of cells: a row with a lost cell would put every number after
+it into the wrong column.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ from flipproof.film.tracker.table import (
 from slicemodel.scenario import shortened
 
 LARGEST: Final = 1e9
-"""Largest magnitude of a number that a table of positions, angles and times may hold, in any unit."""
+"""Largest magnitude of a number in a table of positions, angles and times, in any unit."""
 
 Heading = tuple[str, str, str]
-"""Of a column: the track it belongs to, its plain name, its unit ("" if none is stated)."""
+"""Track, plain name and unit ("" if none is stated) of a column."""
 
 
 def read_track_table(path: Path | str, *more: Path | str) -> TrackTable:
@@ -62,7 +62,7 @@ def read_track_table(path: Path | str, *more: Path | str) -> TrackTable:
         times that do not increase, a column or a track that occurs twice, files whose times do not fit together.
     """
     tables = [_read(Path(name)) for name in (path, *more)]
-    return tables[0] if len(tables) == 1 else _joined(tables)
+    return tables[0] if len(tables) == 1 else _join(tables)
 
 
 def _read(path: Path) -> TrackTable:
@@ -72,20 +72,20 @@ def _read(path: Path) -> TrackTable:
     above = _names_line(lines[:k], header)
     rows = [(line, line.cells(delimiter)) for line in below]
     titles = header.cells(delimiter)
-    if delimiter == " " and not _one_space_ends_a_cell(titles, [cells for _, cells in rows]):
+    if delimiter == " " and not _single_space_delimits(titles, [cells for _, cells in rows]):
         titles, rows = header.text.split(), [(line, line.text.split()) for line in below]
-    pieces = len(titles)
-    titles = titles[:-1] if pieces > 1 and not titles[-1] else titles
+    n_cells = len(titles)
+    titles = titles[:-1] if n_cells > 1 and not titles[-1] else titles
     if "" in titles:
         raise header.error(f"column {titles.index('') + 1} has no name; {EXPORT} again")
     for line, cells in rows:
         if column_name(cells[0])[0].lower() in TIMES:
             raise line.error("a second row of column names; two exports were joined: put each into a file of its own")
-    rows = _of_one_length(path, rows, len(titles), delimiter)
+    rows = _uniform_rows(path, rows, len(titles), delimiter)
     decimal = decimal_of(rows)
-    headings = _headings(header, titles, _track_names(above, delimiter, titles, pieces))
-    sign = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}[delimiter]
-    dialect = f"{encoding}, {sign}-delimited, decimal {'point' if decimal == '.' else 'comma'}"
+    headings = _headings(header, titles, _track_names(above, delimiter, titles, n_cells))
+    delimiter_name = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}[delimiter]
+    dialect = f"{encoding}, {delimiter_name}-delimited, decimal {'point' if decimal == '.' else 'comma'}"
     return _table(path, headings, rows, decimal, dialect)
 
 
@@ -93,7 +93,7 @@ def _read(path: Path) -> TrackTable:
 
 
 def _names_line(above: Sequence[Line], header: Line) -> Line | None:
-    """Return the row of track names: at most one line besides ``#multi:`` stands above the column names."""
+    """Return the row of track names: at most one line except ``#multi:`` stands above the column names."""
     multi = [line for line in above if line.text.strip(" \t;,").lower() in MULTI]
     others = [line for line in above if line not in multi]
     if len(multi) > 1 or (multi and multi[0] is not above[0]):
@@ -108,18 +108,18 @@ def _names_line(above: Sequence[Line], header: Line) -> Line | None:
     return others[0] if others else None
 
 
-def _one_space_ends_a_cell(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
-    """Return whether one space ends a cell; else spaces align the columns, and no cell is empty."""
+def _single_space_delimits(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> bool:
+    """Return whether a single space delimits cells; else spaces align columns, and no cell is empty."""
     full = len(titles) - (not titles[-1])
     lengths = {len(cells) for cells in rows}
     closed = lengths == {full + 1} and not any(cells[-1] for cells in rows)
     return bool(titles[0]) and (lengths == {full} or closed)
 
 
-def _track_names(line: Line | None, delimiter: str, titles: Sequence[str], pieces: int) -> list[str]:
+def _track_names(line: Line | None, delimiter: str, titles: Sequence[str], n_cells: int) -> list[str]:
     """Return the track of every column after the first, from the row of track names; "" without one.
 
-    ``pieces`` counts the cells of the row of column names, with the empty one behind a closing delimiter.
+    ``n_cells`` counts the cells of the row of column names, including the empty one after a closing delimiter.
     """
     count = len(titles)
     if line is None:
@@ -135,16 +135,16 @@ def _track_names(line: Line | None, delimiter: str, titles: Sequence[str], piece
     starts = [k for k, cell in enumerate(cells) if cell]
     spans = list(pairwise([*starts, count]))
     groups = [titles[begin:end] for begin, end in spans]
-    # An editor that cut the delimiters at the end of the line leaves a table whose tracks must agree among themselves.
-    cut = len(cells) < pieces and all(group == groups[0] for group in groups)
-    if starts[0] != 1 or starts[-1] >= count or not (len(cells) == pieces or cut):
+    # If an editor has trimmed the delimiters at the end of the line, all tracks must have the same columns.
+    trimmed = len(cells) < n_cells and all(group == groups[0] for group in groups)
+    if starts[0] != 1 or starts[-1] >= count or not (len(cells) == n_cells or trimmed):
         raise line.error(
-            f"track names do not fit the columns below ({len(cells)} cells above {pieces}); a name must not hold the "
+            f"track names do not fit the columns below ({len(cells)} cells above {n_cells}); a name must not hold the "
             "delimiter, and one delimiter must follow it per column"
         )
-    twice, times = Counter(plain(cells[k]) for k in starts).most_common(1)[0]
-    if times > 1:
-        raise line.error(f"two tracks are named {twice!r}; rename one in Tracker and export again")
+    name, occurrences = Counter(plain(cells[k]) for k in starts).most_common(1)[0]
+    if occurrences > 1:
+        raise line.error(f"two tracks are named {name!r}; rename one in Tracker and export again")
     return [cells[begin] for begin, end in spans for _ in range(begin, end)]
 
 
@@ -152,15 +152,15 @@ def _headings(line: Line, titles: Sequence[str], names: Sequence[str]) -> list[H
     """Return the headings of the columns after the first; without track names ``xcap`` is column x of track cap."""
     headings = [(track, *column_name(title)) for track, title in zip(names, titles[1:], strict=True)]
     if not any(names) and not {"x", "y"} & {name for _, name, _ in headings}:
-        headings = [_of_data_track(line, name, unit) for _, name, unit in headings]
-    for (track, name), times in Counter((track, name) for track, name, _ in headings).items():
-        if times > 1 or name.lower() in TIMES:
-            of = f" of track {track!r}" if track else ", and no line above names the tracks"
-            raise line.error(f"column {name!r} occurs twice{of}; export each column once")
+        headings = [_data_track_heading(line, name, unit) for _, name, unit in headings]
+    for (track, name), occurrences in Counter((track, name) for track, name, _ in headings).items():
+        if occurrences > 1 or name.lower() in TIMES:
+            place = f" of track {track!r}" if track else ", and no line above names the tracks"
+            raise line.error(f"column {name!r} occurs twice{place}; export each column once")
     return headings
 
 
-def _of_data_track(line: Line, name: str, unit: str) -> Heading:
+def _data_track_heading(line: Line, name: str, unit: str) -> Heading:
     match = re.fullmatch(r"([xy])(\w+)", name)
     if match is None:
         raise line.error(
@@ -173,29 +173,29 @@ def _of_data_track(line: Line, name: str, unit: str) -> Heading:
 # ---------------------------------------------------------------------- the numbers
 
 
-def _of_one_length(path: Path, rows: Rows, columns: int, delimiter: str) -> Rows:
+def _uniform_rows(path: Path, rows: Rows, columns: int, delimiter: str) -> Rows:
     """Return rows of ``columns`` cells each; all rows of a file end with a delimiter, or none does."""
     if not rows:
         raise TrackFileError(f"{path}: has column names but no rows; {EXPORT} with all cells")
     lengths = Counter(len(cells) for _, cells in rows)
-    empty = not any(cells[-1] for _, cells in rows)
+    last_empty = not any(cells[-1] for _, cells in rows)
     if lengths == {columns: len(rows)}:
-        if empty:
+        if last_empty:
             raise rows[0][0].error(
                 "the last column is empty in every row, as if a column were lost and a delimiter closed every row; "
                 "delete the name of the column, or export again"
             )
         return rows
-    if lengths == {columns + 1: len(rows)} and empty:
+    if lengths == {columns + 1: len(rows)} and last_empty:
         return [(line, cells[:-1]) for line, cells in rows]
     if delimiter == "," and lengths.keys() <= set(range(columns + 1, 2 * columns + 1)):
         raise rows[0][0].error(
             f"has {len(rows[0][1])} cells for {columns} columns; the comma seems to be delimiter and decimal sign at "
             "once: choose tab or semicolon as delimiter when exporting"
         )
-    usual = columns + 1 if lengths[columns + 1] > lengths[columns] else columns
-    line, cells = next((line, cells) for line, cells in rows if len(cells) != usual or (usual > columns and cells[-1]))
-    closing = " and a closing delimiter" if usual > columns else ""
+    width = columns + 1 if lengths[columns + 1] > lengths[columns] else columns
+    line, cells = next((line, cells) for line, cells in rows if len(cells) != width or (width > columns and cells[-1]))
+    closing = " and a closing delimiter" if width > columns else ""
     raise line.error(
         f"has {len(cells)} cells for {columns} columns{closing}; give a missing value an empty cell between its "
         "delimiters, or delete the line"
@@ -240,8 +240,8 @@ def _value(line: Line, cell: str, decimal: str) -> float:
     return value
 
 
-def _joined(tables: Sequence[TrackTable]) -> TrackTable:
-    """Return the tracks of several files over all their times; two times that are nearly one are refused."""
+def _join(tables: Sequence[TrackTable]) -> TrackTable:
+    """Return the tracks of several files over all their times; nearly equal times are refused."""
     source = ", ".join(table.source for table in tables)
     t = np.unique(np.concatenate([table.t for table in tables]))
     steps = np.diff(t)
@@ -251,19 +251,19 @@ def _joined(tables: Sequence[TrackTable]) -> TrackTable:
             f"{source}: the times {t[k]:g} and {t[k + 1]:g} of different files are nearly the same frame; export all "
             "tracks from one clip with one number format, best as one file with several tracks"
         )
-    places = [np.searchsorted(t, table.t) for table in tables]
+    indices = [np.searchsorted(t, table.t) for table in tables]
     lines, resolution = np.zeros(len(t), dtype=np.int64), np.zeros(len(t))
-    for table, place in reversed(list(zip(tables, places, strict=True))):
-        lines[place], resolution[place] = table.lines, table.resolution
+    for table, index in reversed(list(zip(tables, indices, strict=True))):
+        lines[index], resolution[index] = table.lines, table.resolution
     tracks: dict[str, Track] = {}
-    for table, place in zip(tables, places, strict=True):
+    for table, index in zip(tables, indices, strict=True):
         for name, track in table.tracks.items():
             label = name or Path(table.source).stem
             if any(plain(label) == plain(other) for other in tracks):
                 raise TrackFileError(f"{source}: two files hold a track named {label!r}; rename one in Tracker")
             columns = {column: np.full(len(t), np.nan) for column in track.columns}
             for column, values in track.columns.items():
-                columns[column][place] = values
+                columns[column][index] = values
             tracks[label] = Track(name=label, columns=columns, units=track.units)
     dialects = tuple(dialect for table in tables for dialect in table.dialects)
     return TrackTable(source=source, dialects=dialects, t=t, resolution=resolution, tracks=tracks, lines=lines)

@@ -1,6 +1,6 @@
-"""What a Tracker export holds, named tracks of columns over common times, and how its bytes become lines and cells.
+"""A Tracker export, named tracks of columns over common times, and how its bytes become lines and cells.
 
-What is ambiguous is refused with its line and a way out. Nothing is guessed from a majority: a reading is accepted if
+Ambiguities are refused with their line and a way out. Nothing is guessed from a majority: a reading is accepted if
 every line fits it.
 """
 
@@ -41,7 +41,7 @@ class Track:
     units: dict[str, str]
 
     def column(self, name: str) -> FloatArray:
-        """Return a column, shape (P,); a name that the track does not have is refused."""
+        """Return a column, shape (P,); an unknown name is refused."""
         if name not in self.columns:
             raise ValueError(
                 f"track {self.name!r} has no column {name!r}, only {', '.join(self.columns)}; "
@@ -63,9 +63,9 @@ class TrackTable:
     Parameters
     ----------
     source : str - the files, as they are named in messages
-    dialects : how each file is written: its encoding, what stands between cells, and its decimal sign
+    dialects : encoding, delimiter and decimal sign of each file, in words
     t : (P,) - times in the file's unit, increasing
-    resolution : (P,) - half a unit of the last digit with which each time is printed
+    resolution : (P,) - half a unit of the last printed digit of each time
     tracks : by name
     lines : (P,) - line of each row in the first file that has it, counted from 1
     """
@@ -78,9 +78,9 @@ class TrackTable:
     lines: NDArray[np.int64]
 
     def track(self, name: str) -> Track:
-        """Return a track by name, the nearest of which is named if there is none.
+        """Return a track by name; if there is none, the error names the nearest.
 
-        Spaces and underscores are the same, as Tracker's own copying makes them.
+        Spaces and underscores are equivalent, since Tracker exchanges them when copying.
         """
         matches = [track for key, track in self.tracks.items() if plain(key) == plain(name)]
         if len(matches) == 1:
@@ -93,7 +93,7 @@ class TrackTable:
         raise TrackFileError(f"{self.source}: {unknown_name('track', name, self.tracks)}")
 
     def length_unit(self, names: Sequence[str]) -> str:
-        """Return the unit that the headings of x and y of some tracks state, "" if none does; two are refused."""
+        """Return the unit in the headings of x and y of some tracks, "" if none is stated; two are refused."""
         stated = {unit for name in names for column, unit in self.track(name).units.items() if column in ("x", "y")}
         if len(stated) > 1 or not stated <= METRES.keys():
             raise TrackFileError(
@@ -123,7 +123,7 @@ def column_name(heading: str) -> tuple[str, str]:
 # ---------------------------------------------------------------------- bytes, lines and cells
 
 MAX_BYTES: Final = 50_000_000
-"""Larger files are no export: an hour at 240 frames/s with ten columns holds about this."""
+"""Larger files are no export: an hour at 240 frames/s with ten columns takes about this."""
 
 EXPORT: Final = "in Tracker use File > Export > Data File"
 MULTI: Final = ("#multi:", "multi:")
@@ -158,9 +158,9 @@ class Line:
     number: int
     text: str
 
-    def error(self, words: str) -> TrackFileError:
+    def error(self, message: str) -> TrackFileError:
         """Return the error that says what is wrong with this line."""
-        return TrackFileError(f"{self.path}, line {self.number}: {words}")
+        return TrackFileError(f"{self.path}, line {self.number}: {message}")
 
     def cells(self, delimiter: str) -> list[str]:
         """Return the cells without surrounding spaces; a line with quotation marks is refused."""
@@ -225,8 +225,8 @@ def read_lines(path: Path) -> tuple[list[Line], str]:
 def delimiter_of(path: Path, lines: Sequence[Line]) -> tuple[str, int]:
     """Return the delimiter and the index of the row of column names, the first one that begins with t.
 
-    The delimiter is the first of tab, semicolon, comma and space that stands there: a name holds no tab, but may hold
-    a space.
+    The delimiter is the first of tab, semicolon, comma and space that occurs in it: a name holds no tab, but may hold a
+    space.
     """
     if not lines:
         raise TrackFileError(f"{path}: holds no table; {EXPORT}")
@@ -243,14 +243,14 @@ def delimiter_of(path: Path, lines: Sequence[Line]) -> tuple[str, int]:
 
 def decimal_of(rows: Rows) -> str:
     """Return the decimal sign that all numbers share; both signs, or commas that may group thousands, are refused."""
-    words = {".": "point", ",": "comma"}
+    names = {".": "point", ",": "comma"}
     first: dict[str, Line] = {}
-    for sign, line in ((sign, line) for line, cells in rows for cell in cells for sign in words if sign in cell):
+    for sign, line in ((sign, line) for line, cells in rows for cell in cells for sign in names if sign in cell):
         first.setdefault(sign, line)
     if len(first) == 2:
         (earlier, before), (later, line) = first.items()
         raise line.error(
-            f"a number has a decimal {words[later]}, one in line {before.number} a decimal {words[earlier]}; use one "
+            f"a number has a decimal {names[later]}, one in line {before.number} a decimal {names[earlier]}; use one "
             "of them throughout"
         )
     if "," in first and all(GROUPED.fullmatch(cell) for _, cells in rows for cell in cells if "," in cell):
@@ -259,7 +259,7 @@ def decimal_of(rows: Rows) -> str:
 
 
 def number(text: str, decimal: str) -> float | None:
-    """Return the number of a cell, None if it is none; ``9,636E-2`` with a decimal comma is 0.09636."""
+    """Return the number of a cell, None if it holds none; ``9,636E-2`` with a decimal comma is 0.09636."""
     text = text.replace(MINUS, "-")
     return float(text.replace(",", ".")) if NUMBERS[decimal].fullmatch(text) else None
 
