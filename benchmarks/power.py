@@ -94,7 +94,7 @@ def judged(place: tuple[str, str]) -> tuple[str, str, float]:
     solver = planted.solver() if hasattr(planted, "solver") else planted()
     found = certify(Limited(solver, name), until_failed=True)
     first = next((result for result in found.results if result.verdict == FAILED), None)
-    check, line = (first.check, first.words) if first else ("", "")
+    check, line = (first.check, first.text) if first else ("", "")
     return check, line, time.process_time() - began
 
 

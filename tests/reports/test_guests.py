@@ -152,7 +152,7 @@ def test_the_flight_that_is_shown_is_held_to_the_equation_of_the_guest(tmp_path,
 def test_a_flight_is_held_to_where_the_certificate_places_a_solver_that_declares_nothing(reported):
     visit, silent = reported.visits[0], SimpleNamespace(traits=Traits(name="silent"))
     place = SimpleNamespace(facts={"place": {"equation": "eq8", "on_lattice": True}})
-    certificate = SimpleNamespace(results=[SimpleNamespace(found=place)])
+    certificate = SimpleNamespace(results=[SimpleNamespace(observation=place)])
     rung = solve("eq8", THROW, times=TIMES)
     slow = replace(rung, omega=rung.omega * np.linspace(1.0, 0.5, len(TIMES)))
     assert placed_on(visit.guest, certificate, {"eq8": rung}, slow) is None  # what it declares is claimed elsewhere

@@ -1,4 +1,4 @@
-"""The conformance suite: every check of a solver, with what was expected, what came, where and what to do."""
+"""The conformance suite: every check of a solver, with what was expected, what was observed, where and what to do."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.foreign import checks_basic, checks_measured, elsewhere
-from flipproof.foreign.checking import Check, Found, NotApplicableError, drive
+from flipproof.foreign.checking import Check, NotApplicableError, Observation, drive
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.columns import json_ready
@@ -55,44 +55,44 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
         "published-vectors": checks_basic.check_vectors,
     }
 )
-"""Every check by name, in the order in which they are made: one that fails is not the cause of those before it.
+"""Every check by name, in the order in which they run: a failure cannot cause those before it.
 
 A new check is one generator and one line here.
 """
 
 ENOUGH: Final = "enough"
-"""The last line of the whole suite: whether half of the checks could be made."""
+"""The last line of the whole suite: whether at least half of the checks could run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What became of one check; ``found`` is None where it gave no numbers, and ``reason`` says why."""
+    """The outcome of one check; ``observation`` is None if it gave no numbers, and ``reason`` says why."""
 
     check: str
     verdict: str
     title: str
-    found: Found | None = None
+    observation: Observation | None = None
     reason: str = ""
 
     @property
     def line(self) -> str:
-        """One line: verdict, check and ``words``."""
-        return f"{self.verdict:17} {self.check:21} {self.words}"
+        """One line: verdict, check and ``text``."""
+        return f"{self.verdict:17} {self.check:21} {self.text}"
 
     @property
-    def words(self) -> str:
-        """What came against what was expected, where, and what to do if it failed; or why there are no numbers."""
-        if self.found is None:
+    def text(self) -> str:
+        """What was observed and expected, where, and what to do if it failed; or why there are no numbers."""
+        if self.observation is None:
             return self.reason
-        parts = [f"{self.found.came} (expected: {self.found.expected})", self.found.where]
-        parts += [self.found.advice] if self.verdict == FAILED and not self.found.holds else []
-        parts += [self.found.weak] if self.verdict == WEAK else []
+        parts = [f"{self.observation.observed} (expected: {self.observation.expected})", self.observation.where]
+        parts += [self.observation.advice] if self.verdict == FAILED and not self.observation.holds else []
+        parts += [self.observation.weak] if self.verdict == WEAK else []
         return "; ".join(part for part in (*parts, self.reason) if part)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certificate:
-    """All results of one solver; ``domain`` maps what was varied to its least and largest value in what was asked."""
+    """All results of one solver; ``domain`` maps each varied quantity to its least and largest value in the asks."""
 
     traits: Traits
     results: tuple[Result, ...]
@@ -105,7 +105,7 @@ class Certificate:
 
     @property
     def conclusion(self) -> str:
-        """The last line: how many checks there were, what became of them, and of which throws that is true."""
+        """The last line: how many checks there were, how they ended, and for which throws that holds."""
         counts = {v: [r for r in self.results if r.verdict == v] for v in (PASSED, WEAK, FAILED, EXPECTED, WAITING)}
         parts = [f"{len(results)} {v}" for v, results in counts.items() if results or v in (PASSED, FAILED)]
         idle: dict[str, list[str]] = {}
@@ -119,10 +119,10 @@ class Certificate:
         return f"{len(self.results)} checks: {', '.join(parts)}{domain}"
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the passport: what the solver says of itself, what was found, and under which versions."""
+        """Return the passport: what the solver says of itself, the results, and the versions they were made with."""
         facts: dict[str, Any] = {}
         for result in self.results:
-            facts |= dict(result.found.facts) if result.found else {}
+            facts |= dict(result.observation.facts) if result.observation else {}
         return {
             "passport": 2,
             "solver": asdict(self.traits),
@@ -132,7 +132,11 @@ class Certificate:
             },
             "checks": [
                 {name: getattr(r, name) for name in ("check", "verdict", "title", "reason")}
-                | {name: getattr(r.found, name) for name in ("expected", "came", "where", "advice", "weak") if r.found}
+                | {
+                    "came" if name == "observed" else name: getattr(r.observation, name)
+                    for name in ("expected", "observed", "where", "advice", "weak")
+                    if r.observation
+                }
                 for r in self.results
             ],
             "domain": {name: list(ends) for name, ends in self.domain.items()},
@@ -159,7 +163,7 @@ VARIED: Final[Mapping[str, tuple[str, Callable[[Ask], Any]]]] = MappingProxyType
         "time between outputs": ("apart by [s]", lambda ask: np.diff(ask.times) if len(ask.times) > 1 else ask.times),
     }
 )
-"""What says where a verdict is true: how it is printed, and its value or values in an ask."""
+"""The quantities of the domain of a verdict: how each is printed, and its value or values in an ask."""
 
 
 def domain_text(domain: Mapping[str, tuple[float, float]]) -> str:
@@ -171,24 +175,24 @@ def domain_text(domain: Mapping[str, tuple[float, float]]) -> str:
     return ", ".join(parts)
 
 
-class _Asked(Runner):
-    """A runner that is asked every question once, and notes of which throws there are answers."""
+class _Recorder(Runner):
+    """A runner that asks every question once, and records the domain of the throws that were answered."""
 
     def __init__(self, runner: Runner) -> None:
         self.runner, self.traits = runner, runner.traits
-        self.kept: dict[tuple[Any, ...], Answer] = {}
+        self.answers: dict[tuple[Any, ...], Answer] = {}
         self.unanswered: Ask | None = None
         self.explained = False
         self.domain: dict[str, tuple[float, float]] = {}
 
     def __call__(self, ask: Ask) -> Answer:
         key = ask.scenario, ask.times.tobytes(), ask.start.tobytes(), ask.effort
-        if key not in self.kept:
-            self.kept[key] = self.again(ask)
-        return self.kept[key]
+        if key not in self.answers:
+            self.answers[key] = self.ask_again(ask)
+        return self.answers[key]
 
-    def again(self, ask: Ask) -> Answer:
-        """Return the answer, also to what was asked before."""
+    def ask_again(self, ask: Ask) -> Answer:
+        """Ask, even if the same was asked before, and return the answer."""
         try:
             answer = self.runner(ask)
         except ForeignError:
@@ -209,66 +213,68 @@ def certify(
     until_failed: bool = False,
     say: Callable[[Result], object] = lambda _: None,
 ) -> Certificate:
-    """Make the checks of a solver, one after the other.
+    """Run the checks of a solver, one after the other.
 
-    It is held to ``equation``, if given, instead of the one that it declares; ``seed`` draws the throws of "elsewhere";
-    with ``until_failed`` the first failure is the last check; ``say`` is given each result as it comes. Raises
-    ForeignError if the solver cannot be loaded or declares the failure of a check that there is not.
+    It is tested against ``equation``, if given, instead of the one that it declares; ``seed`` draws the throws of
+    "elsewhere"; with ``until_failed`` the first failure is the last check; ``say`` is called with each result. Raises
+    ForeignError if the solver cannot be loaded or declares the failure of a check that does not exist.
     """
     declared = runner.traits if equation is None else replace(runner.traits, equation=equation)
     traits = declared
     for name in traits.expected_failures:
         if name not in CHECKS:
             raise ForeignError(unknown_name("expected_failures: check", name, CHECKS))
-    recorder, names = _Asked(runner), tuple(checks)
+    recorder, names = _Recorder(runner), tuple(checks)
     results: list[Result] = []
     suite: dict[str, Check] = {**CHECKS, "elsewhere": partial(elsewhere.check_elsewhere, seed=seed)}
     for name in names:
         result = _result(name, suite[name], traits, recorder)
-        if result.verdict == FAILED and result.found is None:
-            same = [
+        if result.verdict == FAILED and result.observation is None:
+            earlier_checks = [
                 earlier.check
                 for earlier in results
-                if earlier.found is None and earlier.reason.startswith(result.reason)
+                if earlier.observation is None and earlier.reason.startswith(result.reason)
             ]
-            result = replace(result, reason=f"as in {same[0]}") if same else result
+            result = replace(result, reason=f"as in {earlier_checks[0]}") if earlier_checks else result
         results.append(result)
         say(results[-1])
         if until_failed and results[-1].verdict == FAILED:
             return Certificate(traits=declared, results=tuple(results), domain=recorder.domain)
-        if name == "digits" and results[-1].verdict == WEAK and results[-1].found is not None:
-            traits = replace(traits, precision=results[-1].found.facts["precision"])
+        if name == "digits" and results[-1].verdict == WEAK and results[-1].observation is not None:
+            traits = replace(traits, precision=results[-1].observation.facts["precision"])
     if names == tuple(CHECKS):
-        results.append(_enough(results))
+        results.append(_coverage(results))
         say(results[-1])
     return Certificate(traits=declared, results=tuple(results), domain=recorder.domain)
 
 
-def _result(name: str, check: Check, traits: Traits, recorder: _Asked) -> Result:
+def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Result:
     result = partial(Result, check=name, title=(CHECKS[name].__doc__ or "").partition("\n")[0])
     reason = traits.expected_failures.get(name)
     try:
-        found = drive(check(traits), recorder.again if name in ("determinism", "inputs") else recorder)
+        observation = drive(check(traits), recorder.ask_again if name in ("determinism", "inputs") else recorder)
     except WaitingError as why:
         return result(verdict=WAITING, reason=str(why))
     except NotApplicableError as why:
         return result(verdict=IDLE, reason=str(why))
     except ForeignError as error:
-        words = f"{error}; known: {reason}" if reason else f"{error}{_answered_without(recorder)}"
-        return result(verdict=FAILED if reason is None else EXPECTED, reason=words)
-    if found.holds and reason is not None:
-        return result(verdict=FAILED, found=found, reason=f"declared as a failure ({reason}), but holds")
-    if found.holds:
-        return result(verdict=WEAK if found.weak else PASSED, found=found)
+        message = f"{error}; known: {reason}" if reason else f"{error}{_answered_without(recorder)}"
+        return result(verdict=FAILED if reason is None else EXPECTED, reason=message)
+    if observation.holds and reason is not None:
+        return result(verdict=FAILED, observation=observation, reason=f"declared as a failure ({reason}), but holds")
+    if observation.holds:
+        return result(verdict=WEAK if observation.weak else PASSED, observation=observation)
     return result(
-        verdict=FAILED if reason is None else EXPECTED, found=found, reason=f"known: {reason}" if reason else ""
+        verdict=FAILED if reason is None else EXPECTED,
+        observation=observation,
+        reason=f"known: {reason}" if reason else "",
     )
 
 
-def _answered_without(recorder: _Asked) -> str:
-    """Return without what the ask is answered that was not, of rests, weight, drag and impacts, and what to look at.
+def _answered_without(recorder: _Recorder) -> str:
+    """Return which of rests, weight, drag or impacts must be left out for the failed ask to be answered, and advice.
 
-    Asked once a solver, and only if it answers a throw without any of them.
+    Done once per solver, and only if it answers a throw without any of them.
     """
     ask, recorder.unanswered = recorder.unanswered, None
     if ask is None or recorder.explained or ask.scenario.frozen:
@@ -276,8 +282,8 @@ def _answered_without(recorder: _Asked) -> str:
     recorder.explained = True
     throw = ask.scenario
     share = min(1.0, 1.0 / (abs(throw.omega0) * throw.duration))  # a radian, before most impacts
-    short = replace(ask, scenario=replace(throw, duration=share * throw.duration), times=share * ask.times)
-    bare = replace(short, scenario=replace(short.scenario, gravity=0.0, drag=0.0))
+    shortened = replace(ask, scenario=replace(throw, duration=share * throw.duration), times=share * ask.times)
+    bare = replace(shortened, scenario=replace(shortened.scenario, gravity=0.0, drag=0.0))
 
     def answered(variant: Ask) -> bool:
         try:
@@ -288,49 +294,49 @@ def _answered_without(recorder: _Asked) -> str:
             return False
         return True
 
-    words, name = "", ""
+    condition, name = "", ""
     with suppress(WaitingError):
         if not answered(bare):
             if answered(replace(bare, start=elsewhere.far_from_ends(throw))):
-                words, name = "with every slice far from the ends", "rests"
+                condition, name = "with every slice far from the ends", "rests"
         elif answered(replace(ask, scenario=replace(throw, gravity=0.0))):
-            words, name = "without weight", "weight"
+            condition, name = "without weight", "weight"
         elif answered(replace(ask, scenario=replace(throw, drag=0.0))):
-            words, name = "without drag", "drag"
-        elif answered(short):
-            lively = replace(ask, scenario=replace(throw, gravity=0.0, drag=0.0, restitution=1.0))
-            if answered(replace(lively, start=elsewhere.far_from_ends(throw))):
-                words, name = "as long as no slice rests", "rests"
+            condition, name = "without drag", "drag"
+        elif answered(shortened):
+            elastic = replace(ask, scenario=replace(throw, gravity=0.0, drag=0.0, restitution=1.0))
+            if answered(replace(elastic, start=elsewhere.far_from_ends(throw))):
+                condition, name = "as long as no slice rests", "rests"
             else:
-                words, name = "up to the first impact", "impacts"
-    return name and f"; the same is answered {words}: look at {elsewhere.LOOK_AT[name]}"
+                condition, name = "up to the first impact", "impacts"
+    return name and f"; the same is answered {condition}: look at {elsewhere.LOOK_AT[name]}"
 
 
-def _enough(results: Iterable[Result]) -> Result:
-    """Return whether half of the checks could be made, and half of these were not expected to fail."""
-    meant = [r for r in results if r.check != "published-vectors"]
-    made = [r for r in meant if r.verdict not in (IDLE, WAITING)]
-    kept = [r for r in made if r.verdict != EXPECTED]
-    words = f"{len(made)} of {len(meant)} checks could be made"
-    if holds := 2 * len(made) >= len(meant) and 2 * len(kept) > len(made):
+def _coverage(results: Iterable[Result]) -> Result:
+    """Return whether half of the checks could run, and more than half of these were not expected to fail."""
+    counted = [r for r in results if r.check != "published-vectors"]
+    applicable = [r for r in counted if r.verdict not in (IDLE, WAITING)]
+    not_excused = [r for r in applicable if r.verdict != EXPECTED]
+    observed = f"{len(applicable)} of {len(counted)} checks could be made"
+    if holds := 2 * len(applicable) >= len(counted) and 2 * len(not_excused) > len(applicable):
         advice = ""
-    elif 2 * len(kept) <= len(made):
-        advice = f"not enough to judge: {len(made) - len(kept)} of {len(made)} are declared to fail"
+    elif 2 * len(not_excused) <= len(applicable):
+        advice = f"not enough to judge: {len(applicable) - len(not_excused)} of {len(applicable)} are declared to fail"
     else:
         advice = "not enough to judge: declare equation, refined_by and order if they apply, and answer r and v, too"
     title = "Half of the checks could be made, and are not expected to fail."
-    if waiting := sum(r.verdict == WAITING for r in meant):
-        return Result(check=ENOUGH, verdict=WAITING, title=title, reason=f"{waiting} of {len(meant)} checks wait")
+    if waiting := sum(r.verdict == WAITING for r in counted):
+        return Result(check=ENOUGH, verdict=WAITING, title=title, reason=f"{waiting} of {len(counted)} checks wait")
     return Result(
         check=ENOUGH,
         verdict=PASSED if holds else FAILED,
         title=title,
-        found=Found(holds=holds, expected="half of them or more", came=words, advice=advice),
+        observation=Observation(holds=holds, expected="half of them or more", observed=observed, advice=advice),
     )
 
 
 def findings_of(certificate: Certificate, id_: str = "certify-", title: str = "") -> tuple[Finding, ...]:
-    """Return one finding a check, with ``id_`` and ``title`` before its own.
+    """Return one finding per check, with ``id_`` and ``title`` prefixed to its own.
 
     The value is 1 if it holds, 0 if not; expected failures, waiting and idle checks are observations.
     """
@@ -339,7 +345,7 @@ def findings_of(certificate: Certificate, id_: str = "certify-", title: str = ""
         heading = f"{id_}{result.check}", f"{title}{result.title.rstrip('.')}"
         value = None if result.verdict in (IDLE, WAITING) else float(result.verdict != FAILED)
         if result.verdict in (IDLE, WAITING, EXPECTED):
-            findings.append(observed(*heading, value, note=result.words))
+            findings.append(observed(*heading, value, note=result.text))
         else:
-            findings.append(regression(*heading, value, "", (1.0, 1.0), result.words))
+            findings.append(regression(*heading, value, "", (1.0, 1.0), result.text))
     return tuple(findings)

@@ -1,7 +1,7 @@
-"""What a check is: a generator that yields asks, is sent the answers, and returns what it found.
+"""What a check is: a generator that yields asks, is sent the answers, and returns an observation.
 
-Checks are written this way so that whoever drives them decides where the answers come from: a solver that is asked one
-ask after the other (``certify``), or a folder of answers that somebody made elsewhere (``files.Folder``).
+Checks are written this way so that whoever drives them decides where the answers come from: a solver that answers one
+ask after the other (``certify``), or a folder of answers computed elsewhere (``files.Folder``).
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ THROW: Final = replace(Scenario(), duration=0.3).with_slices(4)
 """The throw of most checks: the paper's own, cut into four slices; eight impacts and more in 0.3 s."""
 
 SMOOTH: Final = replace(THROW, duration=0.05)
-"""The same up to before any equation of the ladder has its first impact."""
+"""The same, ended before the first impact in any equation of the ladder."""
 
 CALM: Final[Mapping[str, Scenario]] = {"weight": replace(SMOOTH, gravity=0.0), "drag": replace(SMOOTH, drag=0.0)}
-"""The same without one of what acts before an impact."""
+"""``SMOOTH`` without one of the forces that act before an impact."""
 
 
 class NotApplicableError(Exception):
@@ -31,16 +31,16 @@ class NotApplicableError(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
-    """What a check found.
+class Observation:
+    """What a check observed.
 
-    ``expected`` and ``came`` are phrases with numbers, ``where`` names throw and time, ``advice`` says what to do if
-    the check failed; ``weak`` says what the check could not see although it holds; ``facts`` goes into the passport.
+    ``expected`` and ``observed`` are phrases with numbers, ``where`` names throw and time, ``advice`` says what to do
+    if the check failed; ``weak`` says what the check could not see although it holds; ``facts`` go into the passport.
     """
 
     holds: bool
     expected: str
-    came: str
+    observed: str
     where: str = ""
     advice: str = ""
     weak: str = ""
@@ -48,12 +48,12 @@ class Found:
 
 
 Result = TypeVar("Result")
-Making = Generator[Sequence[Ask], Sequence[Answer], Found]
-Check = Callable[[Traits], Making]
+CheckGenerator = Generator[Sequence[Ask], Sequence[Answer], Observation]
+Check = Callable[[Traits], CheckGenerator]
 
 
 def times_of(scenario: Scenario, points: int = 61) -> FloatArray:
-    """Return uniform times over the flight [s]; a step of the published program divides the distance of 61 of them."""
+    """Return uniform times over the flight [s]; a step of the published program divides the spacing of 61 of them."""
     return np.linspace(0.0, scenario.duration, points)
 
 
@@ -63,7 +63,7 @@ def ask_of(traits: Traits, scenario: Scenario, level: float = 0, points: int = 6
 
 
 def effort_of(traits: Traits, scenario: Scenario, level: float) -> float | None:
-    """Return the effort of a level: dt halved or steps doubled a level, rtol a tenth."""
+    """Return the effort of a level: each level halves dt, doubles steps, or divides rtol by ten."""
     if traits.refined_by == "dt":
         return scenario.duration / 960.0 / float(2.0**level)
     if traits.refined_by == "steps":
@@ -73,29 +73,29 @@ def effort_of(traits: Traits, scenario: Scenario, level: float) -> float | None:
     return None
 
 
-def shift(one: Answer, other: Answer, scale: float) -> float:
+def shift(first: Answer, second: Answer, scale: float) -> float:
     """Return the largest difference of two curves omega(t), as a fraction of ``scale``."""
-    return float(np.max(np.abs(one.omega - other.omega)) / abs(scale))
+    return float(np.max(np.abs(first.omega - second.omega)) / abs(scale))
 
 
-def when(times: FloatArray, values: FloatArray) -> str:
-    """Return at which time the largest of ``values`` lies, as a phrase."""
+def time_of_max(times: FloatArray, values: FloatArray) -> str:
+    """Return the time of the largest of ``values``, as a phrase."""
     return f"t = {times[int(np.argmax(values))]:.4g} s"
 
 
-def drive(making: Generator[Sequence[Ask], Sequence[Answer], Result], runner: Callable[[Ask], Answer]) -> Result:
-    """Drive a generator of asks to its end, asking ``runner`` whatever it yields, and return what it found."""
+def drive(generator: Generator[Sequence[Ask], Sequence[Answer], Result], runner: Callable[[Ask], Answer]) -> Result:
+    """Drive a generator of asks to its end, send it the answers of ``runner``, and return its result."""
     try:
-        asks = next(making)
+        asks = next(generator)
         while True:
             try:
                 answers = _answers(asks, runner)
             except WaitingError:
                 raise
             except ForeignError as error:
-                asks = making.throw(error)
+                asks = generator.throw(error)
                 continue
-            asks = making.send(answers)
+            asks = generator.send(answers)
     except StopIteration as end:
         result: Result = end.value
         return result
@@ -107,8 +107,8 @@ def _answers(asks: Sequence[Ask], runner: Callable[[Ask], Answer]) -> list[Answe
     for ask in asks:
         try:
             answers.append(runner(ask))
-        except WaitingError as why:
-            waiting = waiting or why
+        except WaitingError as error:
+            waiting = waiting or error
     if waiting is not None:
         raise waiting
     return answers

@@ -11,7 +11,17 @@ import numpy as np
 
 from flipproof.foreign import elsewhere
 from flipproof.foreign.causes import parts_of_inertia
-from flipproof.foreign.checking import CALM, SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift, when
+from flipproof.foreign.checking import (
+    CALM,
+    SMOOTH,
+    THROW,
+    CheckGenerator,
+    NotApplicableError,
+    Observation,
+    ask_of,
+    shift,
+    time_of_max,
+)
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
@@ -21,13 +31,13 @@ from slicemodel.trajectory import FloatArray
 from slicemodel.vectors import Vector, load_all
 
 
-def check_shape(traits: Traits) -> Making:
+def check_shape(traits: Traits) -> CheckGenerator:
     """The solver answers at the times asked, with real, finite numbers of the right shape."""
     (answer,) = yield [ask_of(traits, THROW)]
-    return Found(
+    return Observation(
         holds=True,
         expected="t, theta, omega at the times asked",
-        came="; ".join(answer.given),
+        observed="; ".join(answer.given),
         facts={"fields": answer.given},
     )
 
@@ -37,11 +47,11 @@ OTHER: Final = replace(SMOOTH, theta0=-0.7, omega0=-7.3)
 
 
 SPREAD: Final = np.array([0.9, 0.7, 0.3, 0.2]) * THROW.bottle.length
-"""Places from which slices strike both ends."""
+"""Starting places from which slices strike both ends."""
 SPREAD.setflags(write=False)
 
 
-def check_start(traits: Traits) -> Making:
+def check_start(traits: Traits) -> CheckGenerator:
     """At t = 0 the bottle has the angle and the angular velocity of the throw, and the slices their places."""
     asks = [ask_of(traits, throw) for throw in (THROW, OTHER)]
     asks.append(replace(asks[0], start=SPREAD))  # the same throw from other places
@@ -49,65 +59,65 @@ def check_start(traits: Traits) -> Making:
     bound = max(1e-12, 8 * traits.epsilon)
     for ask, answer in zip(asks, answers, strict=True):
         throw = ask.scenario
-        off = {
+        errors = {
             "theta": abs(answer.theta[0] - throw.theta0) / max(1.0, abs(throw.theta0)),
             "omega": abs(answer.omega[0] / throw.omega0 - 1.0),
         }
         if answer.r is not None:
-            off["r"] = float(np.max(np.abs(answer.r[0] - ask.start))) / throw.bottle.length
-        worst = max(off, key=lambda name: off[name])
-        if not off[worst] <= bound:
+            errors["r"] = float(np.max(np.abs(answer.r[0] - ask.start))) / throw.bottle.length
+        worst = max(errors, key=lambda name: errors[name])
+        if not errors[worst] <= bound:
             break
-    late = (answer.theta[0] - throw.theta0) / throw.omega0
-    drifted = worst == "theta" and bound < late < 0.02  # a step or two; answers may belong to other times
-    kept = ask is asks[-1] and (worst == "omega" or np.array_equal(answer.omega, answers[0].omega))
-    sloped = worst == "omega" and not kept and bound < off[worst] < 0.05
-    hint = _of_places(ask, answer) if worst == "r" and answer.r is not None else ""
-    begun = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
-    short = _cut_short(worst, begun[worst][0], float(begun[worst][1][0])) if worst in begun else ""
-    return Found(
-        holds=off[worst] <= bound,
+    delay = (answer.theta[0] - throw.theta0) / throw.omega0
+    drifted = worst == "theta" and bound < delay < 0.02  # a step or two; answers may belong to other times
+    cached = ask is asks[-1] and (worst == "omega" or np.array_equal(answer.omega, answers[0].omega))
+    from_slope = worst == "omega" and not cached and bound < errors[worst] < 0.05
+    hint = _places_advice(ask, answer) if worst == "r" and answer.r is not None else ""
+    initial = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
+    few_digits = _digits_advice(worst, initial[worst][0], float(initial[worst][1][0])) if worst in initial else ""
+    return Observation(
+        holds=errors[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
-        came=f"{worst} off by {off[worst]:.2g}" + (f", as if it were {late:.2g} s later" if drifted else ""),
+        observed=f"{worst} off by {errors[worst]:.2g}" + (f", as if it were {delay:.2g} s later" if drifted else ""),
         where=f"t = 0 s, theta_0 = {throw.theta0:.3g} rad, omega_0 = {throw.omega0:g} rad/s",
-        advice=short
-        + ("answer at ask.times themselves; " if drifted and not short else "")
-        + ("omega is that of the instant, not a slope of theta between two times; " if sloped else "")
+        advice=few_digits
+        + ("answer at ask.times themselves; " if drifted and not few_digits else "")
+        + ("omega is that of the instant, not a slope of theta between two times; " if from_slope else "")
         + (
             "omega(0) is omega_0 from every start: compute J_0 from ask.start, and cache nothing by throw; "
-            if kept
+            if cached
             else ""
         )
         + (hint or "begin at scenario.theta0, scenario.omega0 and ask.start, with all slices at rest"),
     )
 
 
-def _cut_short(name: str, value: float, answered: float) -> str:
-    """Return that an answer is the value in so few digits, if it is."""
+def _digits_advice(name: str, value: float, answered: float) -> str:
+    """Return that an answer is the value rounded to few digits, if it is."""
     for digits in range(2, 10):
         if answered == float(f"{value:.{digits}g}"):
             return f"{name}_0 has only {digits} digits: read the throw with all its digits; "
     return ""
 
 
-def _of_places(ask: Ask, answer: Answer) -> str:
-    """Return what else than a wrong beginning explains places that are not those of the start."""
+def _places_advice(ask: Ask, answer: Answer) -> str:
+    """Return what, other than a wrong start, explains initial places that differ from those asked."""
     assert answer.r is not None
-    off = np.abs(answer.r[0] - ask.start)
+    errors = np.abs(answer.r[0] - ask.start)
     if not np.ptp(answer.r, axis=0).any():
         return "r is the same at all times: keep a copy of the slices' places for each"
     if np.allclose(np.sort(answer.r[0]), np.sort(ask.start), rtol=1e-6, atol=0.0):
         return "r holds the places of ask.start in another order: every slice keeps its column"
-    for name, half in (("single", np.float32), ("half", np.float16)):
-        if np.all(off <= np.finfo(half).eps * ask.start):
+    for name, dtype in (("single", np.float32), ("half", np.float16)):
+        if np.all(errors <= np.finfo(dtype).eps * ask.start):
             return f"r is rounded to {name} precision: declare it, or keep the digits"
     return ""
 
 
-def check_determinism(traits: Traits) -> Making:
+def check_determinism(traits: Traits) -> CheckGenerator:
     """The same ask has the same answer to the last bit, also with another throw in between."""
     ask, other = ask_of(traits, THROW), ask_of(traits, OTHER)
-    # Ice of as many slices as were thrown before, and of another number: what is kept from the throw before shows.
+    # Ice of as many slices as the throw before, and of another number: state kept from the throw before shows.
     ice = [ask_of(traits, replace(THROW.with_slices(n), frozen=True)) for n in (THROW.n_slices, 8)]
     first, _, second, *frozen, last = yield [ask, other, ask, *ice, ask]
     change = max(
@@ -116,20 +126,20 @@ def check_determinism(traits: Traits) -> Making:
         for again in (second, last)
     )
     flows, stays = (float(np.ptp(answer.omega)) / abs(THROW.omega0) for answer in frozen)
-    kept = flows > 0.01 > 100 * stays
-    came = "the same numbers" if change == 0.0 else f"numbers that differ by {change:.2g}"
-    return Found(
-        holds=change == 0.0 and not kept,
+    cached = flows > 0.01 > 100 * stays
+    observed = "the same numbers" if change == 0.0 else f"numbers that differ by {change:.2g}"
+    return Observation(
+        holds=change == 0.0 and not cached,
         expected="the same numbers",
-        came=f"ice of {THROW.n_slices} slices flows after such a throw, that of 8 does not" if kept else came,
+        observed=f"ice of {THROW.n_slices} slices flows after such a throw, that of 8 does not" if cached else observed,
         where="one throw asked three times, others and ice between",
         advice="reset all state between asks, keep nothing under a part of the throw, and seed random numbers",
     )
 
 
-def check_inputs(traits: Traits) -> Making:
+def check_inputs(traits: Traits) -> CheckGenerator:
     """Whatever part of the question is changed alone, the answer changes."""
-    bottle, stack = THROW.bottle, THROW.initial_positions()
+    bottle, stacked = THROW.bottle, THROW.initial_positions()
     throws = {
         "another water_mass": replace(THROW, water_mass=0.9 * THROW.water_mass),
         "another theta0": replace(THROW, theta0=THROW.theta0 + 0.3),
@@ -144,139 +154,143 @@ def check_inputs(traits: Traits) -> Making:
         },
     }
     ask = replace(ask_of(traits, THROW, -2), start=SPREAD)
-    others = {words: replace(ask_of(traits, throw, -2), start=SPREAD) for words, throw in throws.items()}
-    others["another start"] = replace(ask, start=stack)
-    others["another start of the same mean"] = replace(ask, start=np.array([0.8, 0.7, 0.4, 0.2]) * bottle.length)
-    others["other times"] = replace(ask, times=ask.times**2 / ask.times[-1])
-    others["another order of the start"] = replace(ask, start=SPREAD[::-1].copy())
-    # The first throw comes again before each: whatever is kept of the last throw alone is kept of that one.
-    asks = [question for other in others.values() for question in (ask, other)]
+    variants = {label: replace(ask_of(traits, throw, -2), start=SPREAD) for label, throw in throws.items()}
+    variants["another start"] = replace(ask, start=stacked)
+    variants["another start of the same mean"] = replace(ask, start=np.array([0.8, 0.7, 0.4, 0.2]) * bottle.length)
+    variants["other times"] = replace(ask, times=ask.times**2 / ask.times[-1])
+    variants["another order of the start"] = replace(ask, start=SPREAD[::-1].copy())
+    # The first throw is repeated before each variant: a cache of the last throw then holds the first one.
+    asks = [question for variant in variants.values() for question in (ask, variant)]
     answers = yield asks
-    # In another order the same slices turn the bottle alike.
-    fields = dict.fromkeys(others, ("theta", "omega")) | {"another order of the start": ("r",)}
-    same = [
-        words
-        for (words, names), original, changed in zip(fields.items(), answers[::2], answers[1::2], strict=True)
+    # The order of the slices does not change how the bottle turns.
+    fields = dict.fromkeys(variants, ("theta", "omega")) | {"another order of the start": ("r",)}
+    ignored = [
+        label
+        for (label, names), original, changed in zip(fields.items(), answers[::2], answers[1::2], strict=True)
         if all(
             getattr(original, name) is not None and np.array_equal(getattr(original, name), getattr(changed, name))
             for name in names
         )
     ]
-    return Found(
-        holds=not same,
+    return Observation(
+        holds=not ignored,
         expected="other numbers for another question",
-        came=f"the same numbers to the last bit with {' and with '.join(same)}" if same else "other numbers each time",
-        where=f"{len(others)} parts of the question, each changed alone after the throw of most checks",
+        observed=f"the same numbers to the last bit with {' and with '.join(ignored)}"
+        if ignored
+        else "other numbers each time",
+        where=f"{len(variants)} parts of the question, each changed alone after the throw of most checks",
         advice="read it from the question, and keep no answer under a part of the question"
-        + ("; or no slice strikes an end: look at what moves them" if same == ["another restitution"] else ""),
+        + ("; or no slice strikes an end: look at what moves them" if ignored == ["another restitution"] else ""),
     )
 
 
-def check_times(traits: Traits) -> Making:
+def check_times(traits: Traits) -> CheckGenerator:
     """The answer is that of the time asked, and does not depend on the other times asked."""
-    end, apart = SMOOTH.duration, SMOOTH.duration / 3000  # a third of a step
+    end, gap = SMOOTH.duration, SMOOTH.duration / 3000  # a third of a step
     sparse_times = end * np.array([0.2507, 0.5013, 0.7519, 1.0])
     dense_times = np.union1d(
-        [*sparse_times, *(sparse_times - apart)], end * np.random.default_rng(0).uniform(0.06, 1.0, 40)
+        [*sparse_times, *(sparse_times - gap)], end * np.random.default_rng(0).uniform(0.06, 1.0, 40)
     )
     common = np.searchsorted(dense_times, sparse_times)
     levels = (0, -1) if traits.refined_by else (0,)
     asks = [
         replace(ask_of(traits, SMOOTH, level), times=times) for level in levels for times in (sparse_times, dense_times)
     ]
-    # The end alone: some solvers take so many steps from one output to the next and no more.
-    sparse, dense, *coarser, alone = yield [*asks, replace(ask_of(traits, SMOOTH), times=sparse_times[-1:])]
+    # The end alone: some solvers take a fixed number of steps between outputs.
+    sparse, dense, *coarser, end_alone = yield [*asks, replace(ask_of(traits, SMOOTH), times=sparse_times[-1:])]
     scale = {"omega": abs(SMOOTH.omega0), "theta": 1.0}
-    worst, off, room = "", np.zeros(4), np.ones(4)
+    worst, errors, room = "", np.zeros(4), np.ones(4)
     for name in scale:
         a, b = getattr(sparse, name), getattr(dense, name)[common]
         own = np.abs(getattr(coarser[0], name) - a) / scale[name] if coarser else np.full(4, 1e-3)
-        mine, allowed = np.abs(a - b) / scale[name], max(1e-5, 64 * traits.epsilon) + 5 * np.maximum.accumulate(own)
-        mine[-1] = max(mine[-1], abs(getattr(alone, name)[0] - a[-1]) / scale[name])
-        if coarser:  # what differs the more the shorter the steps are is no error of the step
+        change, allowed = np.abs(a - b) / scale[name], max(1e-5, 64 * traits.epsilon) + 5 * np.maximum.accumulate(own)
+        change[-1] = max(change[-1], abs(getattr(end_alone, name)[0] - a[-1]) / scale[name])
+        if coarser:  # a difference that grows as steps shrink is no error of the step
             before = np.abs(getattr(coarser[0], name) - getattr(coarser[1], name)[common]) / scale[name]
-            allowed[mine > np.maximum(1e-3, 4 * before)] = max(1e-5, 64 * traits.epsilon)
-        if np.max(mine / allowed) > np.max(off / room) or not worst:
-            worst, off, room = name, mine, allowed
-    came = f"{worst} differs by {off.max():.2g}"
+            allowed[change > np.maximum(1e-3, 4 * before)] = max(1e-5, 64 * traits.epsilon)
+        if np.max(change / allowed) > np.max(errors / room) or not worst:
+            worst, errors, room = name, change, allowed
+    observed = f"{worst} differs by {errors.max():.2g}"
     where = f"asked at {len(sparse_times)} times, at {len(dense_times)} uneven ones, and at the end alone"
-    if np.all(off <= room):
-        before = np.searchsorted(dense_times, sparse_times - apart)
-        turned = apart * (dense.omega[common] + dense.omega[before]) / 2
-        went, least = np.abs(dense.theta[common] - dense.theta[before] - turned), max(1e-5, 64 * traits.epsilon)
-        if not went.max() <= least:
-            off, room = went, np.full(4, least)
-            came = f"theta advances by {went.max():.2g} rad more or less than omega says"
-            where = f"between two times that are {apart:.2g} s apart"
-    holds = bool(np.all(off <= room))
-    advice = "" if holds else (yield from _of_outputs(traits, sparse, dense.omega[common]))
-    return Found(
+    if np.all(errors <= room):
+        before = np.searchsorted(dense_times, sparse_times - gap)
+        turned = gap * (dense.omega[common] + dense.omega[before]) / 2
+        drift, bound = np.abs(dense.theta[common] - dense.theta[before] - turned), max(1e-5, 64 * traits.epsilon)
+        if not drift.max() <= bound:
+            errors, room = drift, np.full(4, bound)
+            observed = f"theta advances by {drift.max():.2g} rad more or less than omega says"
+            where = f"between two times that are {gap:.2g} s apart"
+    holds = bool(np.all(errors <= room))
+    advice = "" if holds else (yield from _outputs_advice(traits, sparse, dense.omega[common]))
+    return Observation(
         holds=holds,
         expected=f"the same within {room.max():.1g}, its own error",
-        came=came,
-        where=f"{where}, {when(sparse_times, off)}",
+        observed=observed,
+        where=f"{where}, {time_of_max(sparse_times, errors)}",
         advice=f"{advice}the flight begins at t = 0, also if that is not asked; "
         "go exactly to each of ask.times, uneven as they are: cut the last step short, and leave nothing out",
-        facts={"times": float(off.max())},
+        facts={"times": float(errors.max())},
     )
 
 
-def _of_outputs(traits: Traits, few: Answer, often: FloatArray) -> elsewhere.Asking:
-    """Return what to look at if omega is right where it is asked ``often`` and wrong at few times."""
+def _outputs_advice(traits: Traits, sparse: Answer, dense_omega: FloatArray) -> elsewhere.TextGenerator:
+    """Return what to look at if omega is right at dense output times and wrong at sparse ones."""
     try:
         equation = name_of(switches_of(traits.equation or ""))
     except ValueError:
         return ""
-    right = curve(equation, SMOOTH, few.t).omega
-    far, near = (float(np.max(np.abs(omega - right))) for omega in (few.omega, often))
-    if far < 4 * near:
+    exact = curve(equation, SMOOTH, sparse.t).omega
+    sparse_error, dense_error = (float(np.max(np.abs(omega - exact))) for omega in (sparse.omega, dense_omega))
+    if sparse_error < 4 * dense_error:
         return ""
-    answers = yield [replace(ask_of(traits, throw), times=few.t) for throw in CALM.values()]
+    answers = yield [replace(ask_of(traits, throw), times=sparse.t) for throw in CALM.values()]
     for (name, throw), answer in zip(CALM.items(), answers, strict=True):
-        if np.max(np.abs(answer.omega - curve(equation, throw, few.t).omega)) < far / 10:
+        if np.max(np.abs(answer.omega - curve(equation, throw, sparse.t).omega)) < sparse_error / 10:
             return f"right where outputs lie close, and {elsewhere.right_without(name)}"
     return "right where outputs lie close: look at what goes on between two of them, such as J, omega and theta; "
 
 
-def check_ice(traits: Traits) -> Making:
+def check_ice(traits: Traits) -> CheckGenerator:
     """With frozen water omega stays what it was, theta goes with it, and no slice moves."""
     ask = ask_of(traits, replace(THROW, frozen=True))
     (answer,) = yield [ask]
     turned = THROW.omega0 * ask.times
-    off = {
+    errors = {
         "omega": np.abs(answer.omega / THROW.omega0 - 1.0),
         "theta": np.abs(answer.theta - THROW.theta0 - turned) / turned[-1],
     }
     if answer.r is not None:
-        off["r"] = np.max(np.abs(answer.r - ask.start), axis=1) / THROW.bottle.length
-    # An engine's constraints drift so far; formulas keep omega to 1e-12. A thousand steps in single precision round
-    # theta as often, and all the same way.
-    bounds = dict.fromkeys(off, max(1e-6, 16 * traits.epsilon))
+        errors["r"] = np.max(np.abs(answer.r - ask.start), axis=1) / THROW.bottle.length
+    # An engine's constraints drift this far; formulas keep omega to 1e-12. In single precision a thousand steps round
+    # theta a thousand times, all in the same direction.
+    bounds = dict.fromkeys(errors, max(1e-6, 16 * traits.epsilon))
     if traits.precision == "float32":
         bounds["theta"] = 1000 * traits.epsilon / 2
     expected = {"omega": "omega constant", "theta": "theta = theta_0 + omega_0 t", "r": "r constant"}
-    worst = next((name for name in off if not off[name].max() <= bounds[name]), "omega")
+    worst = next((name for name in errors if not errors[name].max() <= bounds[name]), "omega")
     turns = (answer.theta - THROW.theta0 - turned) / (2 * np.pi)
     whole = np.rint(turns)
     wrapped = worst == "theta" and bool(np.ptp(whole)) and float(np.max(np.abs(turns - whole))) <= bounds["theta"]
-    return Found(
-        holds=float(off[worst].max()) <= bounds[worst],
+    return Observation(
+        holds=float(errors[worst].max()) <= bounds[worst],
         expected=f"{expected[worst]} within {bounds[worst]:.1g}",
-        came=f"{worst} off by {off[worst].max():.2g}",
-        where=f"scenario.frozen = True, {when(ask.times, off[worst])}",
-        advice=(_of_pace((answer.theta - THROW.theta0)[1:] / turned[1:]) if worst == "theta" and not wrapped else "")
-        or _of_ice(worst, wrapped, late=float(off["theta"][0]) <= bounds["theta"]),
-        facts={"drift": float(off["omega"].max())},
+        observed=f"{worst} off by {errors[worst].max():.2g}",
+        where=f"scenario.frozen = True, {time_of_max(ask.times, errors[worst])}",
+        advice=(
+            _rate_advice((answer.theta - THROW.theta0)[1:] / turned[1:]) if worst == "theta" and not wrapped else ""
+        )
+        or _ice_advice(worst, wrapped, right_at_first=float(errors["theta"][0]) <= bounds["theta"]),
+        facts={"drift": float(errors["omega"].max())},
     )
 
 
-def _of_ice(worst: str, wrapped: bool, *, late: bool) -> str:
-    """Return what to look at if ice is wrong in one field: theta wrapped, or right at first and ``late`` wrong."""
+def _ice_advice(worst: str, wrapped: bool, *, right_at_first: bool) -> str:
+    """Return what to look at if ice is wrong in one field: theta wrapped, or right at first and wrong later."""
     if wrapped:
         return "theta is off by whole turns: do not wrap it"
     if worst != "theta":
         return "hold every slice where it is when scenario.frozen is true"
-    if not late:
+    if not right_at_first:
         return "let theta go on from theta_0 when scenario.frozen is true"
     return (
         "omega and the slices are right, theta alone is not: theta advances by omega dt over every step, also the last "
@@ -284,51 +298,53 @@ def _of_ice(worst: str, wrapped: bool, *, late: bool) -> str:
     )
 
 
-def _of_pace(pace: FloatArray) -> str:
-    """Return that theta advances by a constant share of omega t, if it does."""
-    off = float(np.median(pace)) - 1.0
-    if abs(off) < 1e-9 or float(np.ptp(pace)) > 1e-3 * abs(off):
+def _rate_advice(rates: FloatArray) -> str:
+    """Return that theta advances by a constant fraction of omega t, if it does."""
+    excess = float(np.median(rates)) - 1.0
+    if abs(excess) < 1e-9 or float(np.ptp(rates)) > 1e-3 * abs(excess):
         return ""
-    return f"theta advances by {1.0 + off:.6g} omega dt in every step: look for weights that do not add up to 1"
+    return f"theta advances by {1.0 + excess:.6g} omega dt in every step: look for weights that do not add up to 1"
 
 
-def check_angle(traits: Traits) -> Making:
+def check_angle(traits: Traits) -> CheckGenerator:
     """theta is the integral of omega over time, also late in a long flight."""
     asks = _refined(traits, 961)
-    long = ask_of(traits, SLOW, 0, 961)
-    alone_ask = replace(ask_of(traits, SLOW, 2 if traits.refined_by else 0), times=long.times[-1:])
-    *answers, late, alone = yield [*asks, long, alone_ask]
-    offs = []
-    for a in (*answers, late):
-        turned = np.cumsum(np.diff(a.t) * (a.omega[1:] + a.omega[:-1]) / 2)  # by the rule of trapezia
-        offs.append(np.abs(np.concatenate([[0.0], turned]) - (a.theta - a.theta[0])))
-    *sizes, slow = [float(off.max()) for off in offs]
-    # With impacts between the times the rule leaves 2e-4 rad per rad of the flight.
+    slow_ask = ask_of(traits, SLOW, 0, 961)
+    slow_end_ask = replace(ask_of(traits, SLOW, 2 if traits.refined_by else 0), times=slow_ask.times[-1:])
+    *answers, slow, slow_end = yield [*asks, slow_ask, slow_end_ask]
+    errors = []
+    for a in (*answers, slow):
+        turned = np.cumsum(np.diff(a.t) * (a.omega[1:] + a.omega[:-1]) / 2)  # trapezoidal rule
+        errors.append(np.abs(np.concatenate([[0.0], turned]) - (a.theta - a.theta[0])))
+    *sizes, slow_error = [float(error.max()) for error in errors]
+    # With impacts between the times the rule errs by 2e-4 rad per rad of the flight.
     bound = max(2e-4, 64 * traits.epsilon) * max(1.0, float(np.ptp(answers[0].theta)))
-    # Of order 2 or more, omega has a kink at an impact and theta none: what falls with the step alone is lost time.
-    enough = 8.0 if (traits.order or 0.0) >= 2.0 and sizes[-1] > bound else 3.0
-    holds = sizes[0] <= bound or (_falls(sizes, enough) and sizes[-1] <= 100 * bound)
-    hint = "" if holds else _own_times(answers[0]) or _jump(asks[0].times, answers[0].omega / THROW.omega0)
+    # For order 2 or more: omega has a kink at an impact, theta has none, so a first-order error is lost time.
+    min_ratio = 8.0 if (traits.order or 0.0) >= 2.0 and sizes[-1] > bound else 3.0
+    holds = sizes[0] <= bound or (_falls(sizes, min_ratio) and sizes[-1] <= 100 * bound)
+    hint = "" if holds else _times_advice(answers[0]) or _jump_advice(asks[0].times, answers[0].omega / THROW.omega0)
     if not (holds or hint):
-        hint = _lags(asks[0], answers[0])
-    stops = holds and (slow > 100 * max(bound, sizes[0]) or late.theta[-1] == late.theta[-2])
-    given_up = abs(alone.theta[-1] - late.theta[-1]) > 0.2 * abs(late.theta[-1] - late.theta[0])
-    halts = _own_times(late) if stops and np.any(np.diff(late.theta[: np.argmax(late.theta)]) == 0.0) else ""
-    if holds and not stops and given_up:
-        return Found(
+        hint = _lag_advice(asks[0], answers[0])
+    stops = holds and (slow_error > 100 * max(bound, sizes[0]) or slow.theta[-1] == slow.theta[-2])
+    end_differs = abs(slow_end.theta[-1] - slow.theta[-1]) > 0.2 * abs(slow.theta[-1] - slow.theta[0])
+    stall_advice = _times_advice(slow) if stops and np.any(np.diff(slow.theta[: np.argmax(slow.theta)]) == 0.0) else ""
+    if holds and not stops and end_differs:
+        return Observation(
             holds=False,
             expected="the same theta, whatever other times are asked",
-            came=f"theta = {alone.theta[-1]:.4g} rad instead of {late.theta[-1]:.4g} rad",
+            observed=f"theta = {slow_end.theta[-1]:.4g} rad instead of {slow.theta[-1]:.4g} rad",
             where=f"flight of {SLOW.duration:g} s, asked at its end alone instead of at 961 times",
             advice="fly from one of ask.times to the next, however far apart they are: look for a largest number of "
             "steps, or what is done once between two of them",
         )
-    return Found(
+    return Observation(
         holds=holds and not stops,
         expected=f"theta - theta_0 = integral of omega within {bound:.1g} rad, or a change that falls with dt",
-        came=f"off by {slow:.2g} rad" if stops else f"off by {sizes[0]:.2g} rad{_at_a_quarter(sizes, ' rad')}",
-        where=f"flight of {SLOW.duration:g} s" if stops else when(asks[0].times, offs[0]),
-        advice=halts or "fly to the last of ask.times, however late that is"
+        observed=f"off by {slow_error:.2g} rad"
+        if stops
+        else f"off by {sizes[0]:.2g} rad{_at_a_quarter(sizes, ' rad')}",
+        where=f"flight of {SLOW.duration:g} s" if stops else time_of_max(asks[0].times, errors[0]),
+        advice=stall_advice or "fly to the last of ask.times, however late that is"
         if stops
         else f"{hint}theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a "
         "step with an impact; or the omega answered is not the one by which theta advances",
@@ -336,8 +352,8 @@ def check_angle(traits: Traits) -> Making:
     )
 
 
-def _own_times(answer: Answer) -> str:
-    """Return that an answer belongs to times of its own, where theta stands still or runs straight between them."""
+def _times_advice(answer: Answer) -> str:
+    """Return that an answer is for times of its own, if theta is constant or linear between them."""
     if np.any(np.diff(answer.theta) == 0.0):
         return "theta stands still between two of the times asked: answer at ask.times themselves; "
     bends = np.abs(np.diff(answer.theta, 2)) > 1e-12 * np.max(np.abs(answer.theta))
@@ -346,15 +362,15 @@ def _own_times(answer: Answer) -> str:
     return ""
 
 
-def _lags(ask: Ask, answer: Answer) -> str:
-    """Return that the omega answered is that of another instant, if it is not what the places answered make of it."""
+def _lag_advice(ask: Ask, answer: Answer) -> str:
+    """Return that omega belongs to another instant, if it does not follow from the places answered with it."""
     if answer.r is None or float(_drift(ask, answer).max()) < 1e-5:
         return ""
     return "omega is not J_0 omega_0 / J of the places answered with it: answer the omega of the same instant; "
 
 
-def _jump(times: FloatArray, omega: FloatArray) -> str:
-    """Return where omega [omega_0] jumps, which it never does: the slices, and with them J, move continuously."""
+def _jump_advice(times: FloatArray, omega: FloatArray) -> str:
+    """Return where omega [omega_0] jumps, if it does: it must not, since the slices, and so J, change continuously."""
     steps = np.abs(np.diff(omega))
     k = int(np.argmax(steps))
     if steps[k] < max(0.01, 10 * np.quantile(steps, 0.98)):
@@ -364,41 +380,41 @@ def _jump(times: FloatArray, omega: FloatArray) -> str:
 
 
 SLOW: Final = replace(THROW, omega0=THROW.omega0 / 8, duration=8 * THROW.duration)
-"""A throw that turns as far in eight times the time."""
+"""A throw that turns as far as ``THROW`` in eight times the time."""
 
 
-def check_definitions(traits: Traits) -> Making:
+def check_definitions(traits: Traits) -> CheckGenerator:
     """r_cm and inertia are those of the slices at the same instant."""
     ask = ask_of(traits, THROW)
     (answer,) = yield [ask]
     if answer.r is None:
         raise NotApplicableError("no r is given")
-    own = {"r_cm": centre_of_mass(THROW, answer.r), "inertia": moment_of_inertia(THROW, answer.r)}
-    scale = {"r_cm": THROW.bottle.length, "inertia": float(np.max(own["inertia"]))}
-    off = {name: np.abs(getattr(answer, name) - own[name]) / scale[name] for name in own}
-    worst = max(off, key=lambda name: float(off[name].max()))
+    derived = {"r_cm": centre_of_mass(THROW, answer.r), "inertia": moment_of_inertia(THROW, answer.r)}
+    scale = {"r_cm": THROW.bottle.length, "inertia": float(np.max(derived["inertia"]))}
+    errors = {name: np.abs(getattr(answer, name) - derived[name]) / scale[name] for name in derived}
+    worst = max(errors, key=lambda name: float(errors[name].max()))
     bound = max(2e-5, 64 * traits.epsilon)  # six printed digits are right
-    return Found(
-        holds=float(off[worst].max()) <= bound,
+    return Observation(
+        holds=float(errors[worst].max()) <= bound,
         expected=f"within {bound:.1g} of those that follow from r",
-        came=f"{worst} off by {off[worst].max():.2g}",
-        where=when(answer.t, off[worst]),
-        advice=_of_decimals(answer)
-        + _of_before(getattr(answer, worst), own[worst])
-        + (_of_parts(answer) if worst == "inertia" else "")
+        observed=f"{worst} off by {errors[worst].max():.2g}",
+        where=time_of_max(answer.t, errors[worst]),
+        advice=_decimals_advice(answer)
+        + _delay_advice(getattr(answer, worst), derived[worst])
+        + (_parts_advice(answer) if worst == "inertia" else "")
         + "r_cm is the centre of mass of bottle and water from the cap, J that about it with the bottle's own: "
         "look at the masses, at the bottle's own inertia, and at where the answer is put together",
     )
 
 
-def _of_before(answered: FloatArray, right: FloatArray) -> str:
-    """Return that what is answered belongs to the output before, if it does."""
-    late = np.max(np.abs(answered[1:] - right[:-1])) < 1e-3 * np.ptp(right)
-    return "it is that of the output before: answer what belongs to r of the same instant; " if late else ""
+def _delay_advice(answered: FloatArray, exact: FloatArray) -> str:
+    """Return that the values answered belong to the previous output, if they do."""
+    delayed = np.max(np.abs(answered[1:] - exact[:-1])) < 1e-3 * np.ptp(exact)
+    return "it is that of the output before: answer what belongs to r of the same instant; " if delayed else ""
 
 
-def _of_parts(answer: Answer) -> str:
-    """Return which part of J by its definition counts more or less than once in the inertia answered, if one does."""
+def _parts_advice(answer: Answer) -> str:
+    """Return which parts of the definition of J count more or less than once in the inertia answered, if any."""
     assert answer.r is not None
     assert answer.inertia is not None
     parts = parts_of_inertia(THROW, answer.r)
@@ -406,12 +422,12 @@ def _of_parts(answer: Answer) -> str:
     factors, *_ = np.linalg.lstsq(columns, answer.inertia, rcond=1e-12)
     if np.max(np.abs(columns @ factors - answer.inertia)) > 1e-4 * np.max(answer.inertia):
         return ""
-    off = [f"{name} counts {f:.3g} times" for name, f in zip(parts, factors, strict=True) if abs(f - 1.0) > 1e-3]
-    return f"in J = {' + '.join(parts)}, {' and '.join(off)}; " if off else ""
+    wrong = [f"{name} counts {f:.3g} times" for name, f in zip(parts, factors, strict=True) if abs(f - 1.0) > 1e-3]
+    return f"in J = {' + '.join(parts)}, {' and '.join(wrong)}; " if wrong else ""
 
 
-def _of_decimals(answer: Answer) -> str:
-    """Return that the inertia is printed with few decimals, if it is: in kg m^2 these are few digits."""
+def _decimals_advice(answer: Answer) -> str:
+    """Return that the inertia is printed with few decimals, if it is: in kg m^2 that leaves few digits."""
     inertia = answer.inertia
     for decimals in range(3, 10) if "inertia" in answer.given else ():
         if inertia is not None and np.array_equal(np.round(inertia, decimals), inertia):
@@ -419,51 +435,53 @@ def _of_decimals(answer: Answer) -> str:
     return ""
 
 
-def check_velocity(traits: Traits) -> Making:
+def check_velocity(traits: Traits) -> CheckGenerator:
     """v is the rate at which r changes, whatever other times are asked."""
-    often = [ask_of(traits, SMOOTH, level, 961) for level in ((0, 2) if traits.refined_by else (0,))]
-    seldom = np.array([0, 240, 400, 800, 960])
-    times = often[0].times[seldom]
+    dense_asks = [ask_of(traits, SMOOTH, level, 961) for level in ((0, 2) if traits.refined_by else (0,))]
+    indices = np.array([0, 240, 400, 800, 960])
+    times = dense_asks[0].times[indices]
     times.setflags(write=False)
-    *answers, few = yield [*often, replace(often[0], times=times)]
+    *answers, sparse = yield [*dense_asks, replace(dense_asks[0], times=times)]
     if answers[0].r is None or answers[0].v is None:
         raise NotApplicableError("no v is given")
     sizes, step = [], float(answers[0].t[1])
     for a in answers:
         assert a.r is not None
         assert a.v is not None
-        off = np.abs(np.diff(a.r, axis=0) / step - (a.v[1:] + a.v[:-1]) / 2)
-        sizes.append(float(np.quantile(off, 0.9) / max(float(np.max(np.abs(a.v))), 1e-300)))
+        differences = np.abs(np.diff(a.r, axis=0) / step - (a.v[1:] + a.v[:-1]) / 2)
+        sizes.append(float(np.quantile(differences, 0.9) / max(float(np.max(np.abs(a.v))), 1e-300)))
     fastest = max(float(np.max(np.abs(answers[0].v))), 1e-6)
     bound = (1e-4 if traits.refined_by else 1e-2) + 4 * traits.epsilon * THROW.bottle.length / (step * fastest)
-    assert few.r is not None
-    assert few.v is not None
-    moved = float(np.max(np.abs(few.r - answers[0].r[seldom])) / max(float(np.ptp(answers[0].r, axis=0).max()), 1e-300))
-    apart = float(np.max(np.abs(few.v - answers[0].v[seldom]))) / fastest
-    if apart > 100 * max(bound, moved):
-        return Found(
+    assert sparse.r is not None
+    assert sparse.v is not None
+    r_change = float(
+        np.max(np.abs(sparse.r - answers[0].r[indices])) / max(float(np.ptp(answers[0].r, axis=0).max()), 1e-300)
+    )
+    v_change = float(np.max(np.abs(sparse.v - answers[0].v[indices]))) / fastest
+    if v_change > 100 * max(bound, r_change):
+        return Observation(
             holds=False,
             expected="the v of an instant, whatever other times are asked",
-            came=f"v changes by {apart:.2g} of its largest value and r by {moved:.2g} of its way",
+            observed=f"v changes by {v_change:.2g} of its largest value and r by {r_change:.2g} of its way",
             where=f"0.05 s, asked at {len(times)} and at {len(answers[0].t)} times",
             advice="v is the state's at each of ask.times, not a slope of r from one of them to the next",
         )
-    return Found(
+    return Observation(
         holds=sizes[0] <= bound or (_falls(sizes) and sizes[-1] < 1e-2),
         expected=f"v = dr/dt within {bound:.1g} of the largest v, or a difference that falls with refinement",
-        came=f"off by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
+        observed=f"off by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
         where="0.05 s",
-        advice=_own_times(answers[0])
+        advice=_times_advice(answers[0])
         + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )
 
 
 LOCATED: Final = 10.0
-"""Times its bound up to which a drift is a weakness: slices that had passed an end are put back on it."""
+"""A drift of up to this many times its bound is a weakness: slices that had passed an end are put back on it."""
 
 
-def check_momentum(traits: Traits) -> Making:
+def check_momentum(traits: Traits) -> CheckGenerator:
     """J omega is J_0 omega_0 at all times, with J by its definition from the positions of the slices."""
     asks = _refined(traits)
     answers = yield asks
@@ -471,19 +489,19 @@ def check_momentum(traits: Traits) -> Making:
         raise NotApplicableError("neither r nor inertia is given")
     changes = [_drift(ask, answer) for ask, answer in zip(asks, answers, strict=True)]
     sizes = [float(change.max()) for change in changes]
-    bound = max(1e-6, 64 * traits.epsilon)  # as well as an engine conserves it
+    bound = max(1e-6, 64 * traits.epsilon)  # what an engine achieves
     falls = _falls(sizes)
     holds, advice = sizes[0] <= LOCATED * bound or falls, ""
     if not holds:
         simpler = [ask_of(traits, throw) for throw in SIMPLER.values()]
         drifts = [float(_drift(*pair).max()) for pair in zip(simpler, (yield simpler), strict=True)]
         advice = _right_without(drifts, max(bound, 0.03 * sizes[0]))
-    return Found(
+    return Observation(
         holds=holds,
         weak=f"J omega is kept to {sizes[0]:.1g} only, whatever the step" if sizes[0] > bound and not falls else "",
         expected=f"J omega constant within {bound:.1g}, or a change that falls with refinement",
-        came=f"changed by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
-        where=when(asks[0].times, changes[0]),
+        observed=f"changed by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
+        where=time_of_max(asks[0].times, changes[0]),
         advice=f"{advice}no torque acts about the centre of mass: omega = J_0 omega_0 / J, with J of the same instant, "
         "about the centre of mass, of slices and bottle",
         facts={"momentum": sizes},
@@ -491,7 +509,7 @@ def check_momentum(traits: Traits) -> Making:
 
 
 def _drift(ask: Ask, answer: Answer) -> FloatArray:
-    """Return by how much J omega differs from its value at release, a fraction of it, at the times of an answer."""
+    """Return the difference of J omega from its value at release, as a fraction of it, at each time of an answer."""
     throw = ask.scenario
     inertia = answer.inertia if answer.r is None else moment_of_inertia(throw, answer.r)
     assert inertia is not None
@@ -499,44 +517,44 @@ def _drift(ask: Ask, answer: Answer) -> FloatArray:
 
 
 SIMPLER: Final = {"weight": replace(THROW, gravity=0.0), "drag": replace(THROW, drag=0.0), "impacts": SMOOTH}
-"""The throw of most checks without one of what acts in it."""
+"""The throw of most checks without weight, without drag, or without impacts."""
 
 
-def _right_without(sizes: Sequence[float], most: float) -> str:
-    """Return without what a difference is no larger than ``most``, and what to look at; ``sizes`` as in ``SIMPLER``."""
-    right = [name for name, size in zip(SIMPLER, sizes, strict=True) if size <= most]
+def _right_without(sizes: Sequence[float], bound: float) -> str:
+    """Return what to leave out to keep a difference within ``bound``, and what to look at; ``sizes`` by ``SIMPLER``."""
+    right = [name for name, size in zip(SIMPLER, sizes, strict=True) if size <= bound]
     return elsewhere.right_without(right[0]) if right else ""
 
 
 def _refined(traits: Traits, points: int = 61) -> list[Ask]:
-    """Return the ask for the throw and, of a solver that can be refined, the same at a quarter of the step."""
+    """Return the ask for the throw and, if the solver can be refined, the same at a quarter of the step."""
     return [ask_of(traits, THROW, level, points) for level in ((0, 2) if traits.refined_by else (0,))]
 
 
-def _falls(sizes: Sequence[float], enough: float = 3.0) -> bool:
-    """Return whether a change falls by ``enough`` in two levels of refinement: then it is a step's own error."""
-    return len(sizes) > 1 and sizes[-1] * enough <= sizes[0]
+def _falls(sizes: Sequence[float], min_ratio: float = 3.0) -> bool:
+    """Return whether a change falls by ``min_ratio`` in two levels of refinement: then it is a step's own error."""
+    return len(sizes) > 1 and sizes[-1] * min_ratio <= sizes[0]
 
 
 def _at_a_quarter(sizes: Sequence[float], unit: str = "") -> str:
     return f", {sizes[-1]:.2g}{unit} at a quarter of the step" if len(sizes) > 1 else ""
 
 
-def check_mirror(traits: Traits) -> Making:
+def check_mirror(traits: Traits) -> CheckGenerator:
     """A throw mirrored left to right has the mirrored flight: -theta, -omega, the same r."""
     original, mirrored = yield _mirrored(traits, THROW)
-    change = _unlike(original, mirrored)
+    change = _mirror_error(original, mirrored)
     bound = max(1e-9, 1024 * traits.epsilon)  # the launch is not mirrored, and round-off grows with every impact
     holds, advice = float(change.max()) <= bound, ""
     if not holds:
         answers = yield [ask for throw in SIMPLER.values() for ask in _mirrored(traits, throw)]
-        sizes = [float(_unlike(*pair).max()) for pair in zip(answers[::2], answers[1::2], strict=True)]
+        sizes = [float(_mirror_error(*pair).max()) for pair in zip(answers[::2], answers[1::2], strict=True)]
         advice = _right_without(sizes, bound)
-    return Found(
+    return Observation(
         holds=holds,
         expected=f"omega -> -omega within {bound:.1g} of omega_0",
-        came=f"off by {change.max():.2g}",
-        where=when(original.t, change),
+        observed=f"off by {change.max():.2g}",
+        where=time_of_max(original.t, change),
         advice=f"{advice}look for abs(omega), a sign of theta, another angle than theta in the weight, or a place that "
         "assumes omega > 0",
     )
@@ -547,56 +565,56 @@ def _mirrored(traits: Traits, throw: Scenario) -> list[Ask]:
     return [ask_of(traits, variant) for variant in (throw, replace(throw, theta0=-throw.theta0, omega0=-throw.omega0))]
 
 
-def _unlike(original: Answer, mirrored: Answer) -> FloatArray:
-    """Return how far omega is from that of the mirror image, fraction of omega_0."""
+def _mirror_error(original: Answer, mirrored: Answer) -> FloatArray:
+    """Return the difference of omega from that of the mirror image, as a fraction of omega_0."""
     return np.asarray(np.abs(original.omega + mirrored.omega) / abs(THROW.omega0))
 
 
-def check_moving_frame(traits: Traits) -> Making:
+def check_moving_frame(traits: Traits) -> CheckGenerator:
     """A bottle thrown with another velocity, and so seen from a moving frame, turns alike."""
     original, moving = yield [ask_of(traits, THROW), ask_of(traits, replace(THROW, launch_velocity=(3.0, -1.0)))]
     change = shift(original, moving, THROW.omega0)
     bound = max(1e-7, 1024 * traits.epsilon)
-    return Found(
+    return Observation(
         holds=change <= bound,
         expected=f"no change beyond {bound:.1g} of omega_0",
-        came=f"omega changes by {change:.2g}",
+        observed=f"omega changes by {change:.2g}",
         where="launch_velocity = (3, -1) m/s instead of (0.5, 1.94) m/s",
         advice="nothing inside the bottle may know how fast it flies",
     )
 
 
-def check_gravity(traits: Traits) -> Making:
+def check_gravity(traits: Traits) -> CheckGenerator:
     """omega(t) changes with half of the weight as much as in the declared equation; in free flight not at all."""
     if traits.equation is None:
         raise NotApplicableError("no equation is declared")
     place = yield from placing(traits)
     if not place.on_lattice or place.equation != name_of(switches_of(traits.equation)):
         raise NotApplicableError("told by the check of the equation")
-    light, without = (replace(THROW, gravity=g) for g in (THROW.gravity / 2, 0.0))
+    light, weightless = (replace(THROW, gravity=g) for g in (THROW.gravity / 2, 0.0))
     for levels in ((1, 0), (3, 2)) if traits.refined_by else ((0,),):
-        half, free, *coarser = yield [ask_of(traits, throw, level) for level in levels for throw in (light, without)]
-        exact = [curve(traits.equation, throw, half.t).omega / THROW.omega0 for throw in (light, without)]
+        half, free, *coarser = yield [ask_of(traits, throw, level) for level in levels for throw in (light, weightless)]
+        exact = [curve(traits.equation, throw, half.t).omega / THROW.omega0 for throw in (light, weightless)]
         measured, expected = (half.omega - free.omega) / THROW.omega0, exact[0] - exact[1]
-        own = sum(shift(a, b, THROW.omega0) for a, b in zip((half, free), coarser, strict=False))
-        room = max(1e-4, 1024 * traits.epsilon, 4 * own) + (0.0 if coarser else place.room)
-        off = np.abs(measured - expected)
-        if float(off.max()) <= room <= 1e-3:
+        own_error = sum(shift(a, b, THROW.omega0) for a, b in zip((half, free), coarser, strict=False))
+        room = max(1e-4, 1024 * traits.epsilon, 4 * own_error) + (0.0 if coarser else place.room)
+        errors = np.abs(measured - expected)
+        if float(errors.max()) <= room <= 1e-3:
             break
-    weightless = float(np.max(np.abs(free.omega / THROW.omega0 - exact[1])))
-    if float(off.max()) > room and weightless > room:
+    weightless_error = float(np.max(np.abs(free.omega / THROW.omega0 - exact[1])))
+    if float(errors.max()) > room and weightless_error > room:
         raise NotApplicableError("without weight omega is wrong, too: told by the check elsewhere")
-    return Found(
-        holds=float(off.max()) <= room,
+    return Observation(
+        holds=float(errors.max()) <= room,
         expected=f"omega changes by {np.abs(expected).max():.2g} of omega_0 at most, as in {traits.equation}",
-        came=f"by {np.abs(measured).max():.2g} at most, {off.max():.2g} off at one time (room {room:.1g})",
-        where=f"g = {light.gravity:g} against 0 m/s^2, {when(half.t, off)}",
+        observed=f"by {np.abs(measured).max():.2g} at most, {errors.max():.2g} off at one time (room {room:.1g})",
+        where=f"g = {light.gravity:g} against 0 m/s^2, {time_of_max(half.t, errors)}",
         advice="the weight term is proportional to the throw's gravity: look for a constant or a switch",
         facts={"gravity": float(np.abs(measured).max())},
     )
 
 
-def check_vectors(traits: Traits) -> Making:
+def check_vectors(traits: Traits) -> CheckGenerator:
     """A solver that claims to be a published program prints its numbers."""
     vectors = [vector for vector in load_all() if vector.scheme == traits.equation]
     if not vectors:
@@ -607,13 +625,13 @@ def check_vectors(traits: Traits) -> Making:
         for column in ("theta", "omega"):
             printed = vector.columns[column][: len(answer.t)]
             rows = np.isfinite(printed)
-            off = np.abs(getattr(answer, column) - printed)[rows] / np.maximum(np.abs(printed[rows]), 1e-300)
-            if not off.max() <= worst:
-                worst, where = float(off.max()), f"{vector.name}, column {column}"
-    return Found(
+            errors = np.abs(getattr(answer, column) - printed)[rows] / np.maximum(np.abs(printed[rows]), 1e-300)
+            if not errors.max() <= worst:
+                worst, where = float(errors.max()), f"{vector.name}, column {column}"
+    return Observation(
         holds=worst <= 1e-8,  # flipproof's own schemes keep to 1e-10
         expected=f"{len(vectors)} runs of the paper's programs within 1e-08",
-        came=f"{worst:.2g} off",
+        observed=f"{worst:.2g} off",
         where=where,
         advice="compare step by step with the published program's first rows",
         facts={"vectors": worst},
@@ -621,14 +639,14 @@ def check_vectors(traits: Traits) -> Making:
 
 
 def ask_of_vector(vector: Vector, traits: Traits) -> Ask:
-    """Return the ask for a published run, up to where its numbers are held to; the program takes its own steps."""
+    """Return the ask for a published run, up to the last time that is compared; the program takes its own steps."""
     times = np.linspace(0.0, vector.scenario.duration, vector.steps)
     times = times[times <= vector.until]
     effort = {"steps": float(len(times) - 1), "dt": float(times[1])}.get(traits.refined_by or "")
     return Ask.of(replace(vector.scenario, duration=float(times[-1])), times, effort)
 
 
-def check_equation(traits: Traits) -> Making:
+def check_equation(traits: Traits) -> CheckGenerator:
     """The solver is nearest to the equation it declares, and no farther from it than its own error explains."""
     place = yield from placing(traits)
     if traits.equation is None:
@@ -638,19 +656,21 @@ def check_equation(traits: Traits) -> Making:
     except ValueError as error:
         raise NotApplicableError(str(error)) from None
     holds = place.equation == declared and place.on_lattice
-    strict = (yield from elsewhere.on_the_paper(traits, declared)) if holds else ""
-    own, hidden = place.change or 0.0, place.following_distance / 4
-    weak = f"its own error, {own:.2g} of omega_0, is too large to tell equations apart" if own > hidden else ""
-    advice = "" if holds and not strict else (yield from elsewhere.simplified(traits, declared))
+    deviation = (yield from elsewhere.wrong_on_whole(traits, declared)) if holds else ""
+    own_error, limit = place.change or 0.0, place.following_distance / 4
+    weak = (
+        f"its own error, {own_error:.2g} of omega_0, is too large to tell equations apart" if own_error > limit else ""
+    )
+    advice = "" if holds and not deviation else (yield from elsewhere.simpler_throws_advice(traits, declared))
     if not (advice or place.on_lattice or place.still):
         with suppress(ForeignError, NotApplicableError):
-            pieces, what = yield from departing(traits, declared, [ask_of(traits, throw) for throw in THROWS])
-            advice = pieces and f"there it departs {pieces}; {what and f'{what}; '}"
+            departure, cause = yield from departing(traits, declared, [ask_of(traits, throw) for throw in THROWS])
+            advice = departure and f"there it departs {departure}; {cause and f'{cause}; '}"
     advice = advice or (place.advice and f"{place.advice}; ")
-    return Found(
-        holds=holds and not strict,
+    return Observation(
+        holds=holds and not deviation,
         expected=declared,
-        came=place.text + (f", but {strict}" if strict else ""),
+        observed=place.text + (f", but {deviation}" if deviation else ""),
         where=f"{len(THROWS)} throws of {THROWS[0].duration:g} to {THROWS[-1].duration:g} s",
         advice=advice.removesuffix("; ")
         or "flipproof explain compares it with the declared equation, switch by switch",

@@ -12,7 +12,16 @@ import numpy as np
 
 from flipproof.curves.order import observed_order
 from flipproof.foreign import departures, elsewhere
-from flipproof.foreign.checking import CALM, SMOOTH, THROW, Found, Making, NotApplicableError, ask_of, shift
+from flipproof.foreign.checking import (
+    CALM,
+    SMOOTH,
+    THROW,
+    CheckGenerator,
+    NotApplicableError,
+    Observation,
+    ask_of,
+    shift,
+)
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.place import curve, name_of, placing, switches_of
 from slicemodel import Scenario
@@ -20,24 +29,24 @@ from slicemodel.trajectory import FloatArray
 
 LEVELS: Final = (0, 1, 2, 3)
 ORDER_ROOM: Final = 0.3
-"""How far an observed order before impacts may be below the declared one."""
+"""How far the observed order before impacts may fall below the declared one."""
 
 STILL: Final = 0.7
-"""Share of the change before from which on a change counts as no smaller."""
+"""A change above this fraction of the previous one counts as no smaller."""
 
 NOISE: Final = 0.5
-"""Share of a change that steps shorter by another sixteenth make where noise limits; with an error of order 1, 0.02."""
+"""A change by steps a sixteenth shorter that exceeds this fraction of the last change is noise; order 1 makes 0.02."""
 
 ROUNDOFF: Final = 1e-11
-"""Changes below which orders drown in round-off, fraction of a field's scale."""
+"""Changes, as a fraction of a field's scale, below which orders drown in round-off."""
 
 LOCATED: Final = 1e-4
-"""Errors across impacts, fraction of omega_0, below which a tolerance of event location is nobody's mistake."""
+"""Errors across impacts, fraction of omega_0, below which a tolerance of event location is no mistake."""
 
 FIELDS: Final = ("omega", "theta", "r", "v")
 
 
-def check_digits(traits: Traits) -> Making:
+def check_digits(traits: Traits) -> CheckGenerator:
     """Numbers have the digits of the precision that is declared."""
     (answer,) = yield [ask_of(traits, THROW, points=121)]
     values = {name: getattr(answer, name) for name in FIELDS if getattr(answer, name) is not None}
@@ -47,26 +56,26 @@ def check_digits(traits: Traits) -> Making:
     facts: dict[str, Any] = {"digits": digits, "arithmetic": "float32" if singles else None}
     expected = f"numbers of {traits.precision}"
     if digits <= 8:
-        wanted = int(traits.precision[0]) if traits.precision.endswith("digits") else 6
-        return Found(
-            holds=digits >= wanted,
+        required = int(traits.precision[0]) if traits.precision.endswith("digits") else 6
+        return Observation(
+            holds=digits >= required,
             expected=expected,
-            came=f"printed with {digits} digits",
+            observed=f"printed with {digits} digits",
             advice='print all digits ("%.17g")',
             weak="print all digits (%.17g)" if traits.precision in ("float64", "float32") else "",
             facts=facts | {"precision": f"{max(6, digits)} digits"},
         )
-    return Found(
+    return Observation(
         holds=not singles or traits.precision != "float64",
         expected=expected,
-        came=f"the numbers of {', '.join(singles)} are those of float32" if singles else "more than 8 digits",
+        observed=f"the numbers of {', '.join(singles)} are those of float32" if singles else "more than 8 digits",
         advice='keep the state in float64, or declare precision = "float32"',
         facts=facts,
     )
 
 
 def _digits(values: FloatArray) -> int:
-    """Return the digits that the numbers of a field have, 17 at most: the fewest that print them all."""
+    """Return the number of digits of a field, at most 17: the fewest that print all its numbers exactly."""
     numbers = values[values != 0.0].tolist()
     for digits in range(3, 9):
         if all(float(f"{x:.{digits}g}") == x for x in numbers):
@@ -74,39 +83,41 @@ def _digits(values: FloatArray) -> int:
     return 17
 
 
-def check_refinement(traits: Traits) -> Making:
+def check_refinement(traits: Traits) -> CheckGenerator:
     """What the solver is told to refine by changes its answer."""
     if traits.refined_by is None:
         raise NotApplicableError("refined_by is not declared")
     levels: tuple[int, ...] = (-6, -2, 0, 2)
     answers = list((yield [ask_of(traits, THROW, level) for level in levels]))
     if traits.refined_by == "rtol" and _change(*answers[-2:]) == 0.0:
-        # A step that may be no longer than it is meets one tolerance as well as the next, until they are very small.
+        # A step that something else limits meets one tolerance as well as the next, until they are very small.
         levels += (4, 6)
         answers += yield [ask_of(traits, THROW, level) for level in levels[-2:]]
     changes = [_change(a, b) for a, b in pairwise(answers)]
-    moved = [change for change in changes if change > 0.0]
-    ended = changes[-1] == 0.0 and max(moved, default=0.0) > 1000 * traits.epsilon
-    holds, weak = bool(moved) and not ended, ""
+    nonzero = [change for change in changes if change > 0.0]
+    stopped = changes[-1] == 0.0 and max(nonzero, default=0.0) > 1000 * traits.epsilon
+    holds, weak = bool(nonzero) and not stopped, ""
     if not holds and traits.refined_by == "rtol":
         error = yield from _error(traits, answers[-1])
         if error is None and traits.equation:
             holds, weak = True, "whether it is accurate is told by the check of the equation"
         elif error is not None and error <= max(ACCURATE, 1024 * traits.epsilon):
             holds, weak = True, f"{error:.1g} of omega_0 off, whatever rtol is: something else limits the step"
-    came = f"changes of {', '.join(f'{c:.2g}' for c in changes)} of omega_0 from level to level"
-    if not moved:
-        came = f"the same answer to the last bit at {len(levels)} levels of {traits.refined_by}"
+    observed = f"changes of {', '.join(f'{c:.2g}' for c in changes)} of omega_0 from level to level"
+    if not nonzero:
+        observed = f"the same answer to the last bit at {len(levels)} levels of {traits.refined_by}"
     advice = f"use ask.effort as {traits.refined_by}, or declare no refined_by"
-    if not moved and not holds and traits.equation and (yield from placing(traits)).equation == traits.equation:
-        why = yield from elsewhere.simplified(traits, traits.equation)
-        advice = f"{why}{advice}" if why.startswith("right") else advice
+    if not nonzero and not holds and traits.equation and (yield from placing(traits)).equation == traits.equation:
+        cause = yield from elsewhere.simpler_throws_advice(traits, traits.equation)
+        advice = f"{cause}{advice}" if cause.startswith("right") else advice
     if not holds:
-        came += ": steps grow no shorter, ask.effort is ignored from there on" if moved else ": ask.effort is ignored"
-    return Found(
+        observed += (
+            ": steps grow no shorter, ask.effort is ignored from there on" if nonzero else ": ask.effort is ignored"
+        )
+    return Observation(
         holds=holds,
         expected=f"an answer that changes with {traits.refined_by}",
-        came=came,
+        observed=observed,
         where="0.3 s with impacts",
         advice=advice,
         weak=weak,
@@ -114,21 +125,21 @@ def check_refinement(traits: Traits) -> Making:
 
 
 ACCURATE: Final = 1e-10
-"""Error, fraction of omega_0, that is left to a solver that changes nothing for the finest tolerances."""
+"""Error, fraction of omega_0, allowed to a solver whose answer ignores the finest tolerances."""
 
 
 def _error(traits: Traits, answer: Answer) -> Generator[Sequence[Ask], Sequence[Answer], float | None]:
-    """Return how far omega is from that of the equation that the solver solves; None if that is not known."""
+    """Return the error of omega against the equation that the solver solves; None if that is not known."""
     place = yield from placing(traits)
     return shift(answer, curve(place.equation, THROW, answer.t), THROW.omega0) if place.on_lattice else None
 
 
 def _change(coarse: Answer, fine: Answer) -> float:
     """Return the largest difference of omega and theta, each as a fraction of its scale."""
-    return max(shift(coarse, fine, THROW.omega0), _apart(coarse, fine, "theta"))
+    return max(shift(coarse, fine, THROW.omega0), _field_difference(coarse, fine, "theta"))
 
 
-def _apart(coarse: Answer, fine: Answer, name: str) -> float:
+def _field_difference(coarse: Answer, fine: Answer, name: str) -> float:
     """Return the largest difference of a field, fraction of its largest value."""
     a, b = getattr(coarse, name), getattr(fine, name)
     return float(np.max(np.abs(a - b)) / max(float(np.max(np.abs(b))), 1e-300))
@@ -143,11 +154,11 @@ def _order_of(traits: Traits) -> float:
     return traits.order
 
 
-def check_order_before(traits: Traits) -> Making:
+def check_order_before(traits: Traits) -> CheckGenerator:
     """Before the first impact the error of every field falls with the step at the declared order, or faster."""
     declared = _order_of(traits)
-    # Few and long steps: at short ones an order of 4 and more drowns in round-off. Low orders show at short ones only.
-    # The theory is of short ones: the best of the ratios counts.
+    # Few and long steps: at short ones an order of 4 or more drowns in round-off. Low orders show only at short ones.
+    # The order is a limit for short steps: the best of the ratios counts.
     levels = range(-8, -2) if declared > 2 else range(-4, 0)
     orders, largest = yield from _orders_before(traits, SMOOTH, levels)
     if not orders:
@@ -156,23 +167,27 @@ def check_order_before(traits: Traits) -> Making:
     holds, advice = orders[worst] >= declared - ORDER_ROOM, ""
     if not holds:
         for name, throw in CALM.items():
-            without, _ = yield from _orders_before(traits, throw, levels)
-            if without and min(without.values()) >= declared - ORDER_ROOM:
+            orders_without, _ = yield from _orders_before(traits, throw, levels)
+            if orders_without and min(orders_without.values()) >= declared - ORDER_ROOM:
                 advice = f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}"
                 break
-    low, kept = (
+    low, right = (
         [name for name, order in orders.items() if (order < declared - ORDER_ROOM) == below] for below in (True, False)
     )
-    if low and kept:
-        usual = f"{', '.join(kept)} of that order: look at how {' and '.join(low)} is advanced in a step, and answered"
+    if low and right:
+        default_advice = (
+            f"{', '.join(right)} of that order: look at how {' and '.join(low)} is advanced in a step, and answered"
+        )
     else:
-        usual = "a coefficient of the step, or the instant at which omega, r_CM or J are taken, costs the order"
-    return Found(
+        default_advice = (
+            "a coefficient of the step, or the instant at which omega, r_CM or J are taken, costs the order"
+        )
+    return Observation(
         holds=holds,
         expected=f"order {declared:g} or more, within {ORDER_ROOM}",
-        came=f"{orders[worst]:.2f} ({worst})",
+        observed=f"{orders[worst]:.2f} ({worst})",
         where=f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves",
-        advice=advice or usual,
+        advice=advice or default_advice,
         facts={"order_before_impacts": orders[worst], "orders": orders},
     )
 
@@ -180,26 +195,26 @@ def check_order_before(traits: Traits) -> Making:
 def _orders_before(
     traits: Traits, throw: Scenario, levels: Sequence[int]
 ) -> Generator[Sequence[Ask], Sequence[Answer], tuple[dict[str, float], float]]:
-    """Return the observed order by field, none where changes are round-off, and the largest change of omega."""
+    """Return the observed order by field, omitted where changes are round-off, and the largest change of omega."""
     answers = yield [ask_of(traits, throw, level, points=3) for level in levels]
     orders: dict[str, float] = {}
     floor = max(ROUNDOFF, 64 * traits.epsilon)
     for name in FIELDS:
         if getattr(answers[0], name) is None:
             continue
-        clear = [change for a, b in pairwise(answers) if (change := _apart(a, b, name)) > floor]
+        clear = [change for a, b in pairwise(answers) if (change := _field_difference(a, b, name)) > floor]
         ratios = [math.log2(a / b) for a, b in pairwise(clear)]
         if ratios:
             orders[name] = max(ratios)
     return orders, max(shift(a, b, throw.omega0) for a, b in pairwise(answers))
 
 
-def check_order_across(traits: Traits) -> Making:
+def check_order_across(traits: Traits) -> CheckGenerator:
     """Across impacts the error falls with the step, at order one half or more, down to where impacts are located."""
     declared = _order_of(traits)
-    # Several throws and steps a level: where rebounds wait for the grid, a single one carries the luck of its phase.
-    throws = [THROW.with_slices(THROW.n_slices + more) for more in (0, 1, 2)]
-    levels = [level - 4 + part for level in LEVELS for part in (0.0, 0.19)]
+    # Several throws and steps per level: where rebounds wait for the grid, a single one depends on its phase.
+    throws = [THROW.with_slices(THROW.n_slices + extra) for extra in (0, 1, 2)]
+    levels = [level - 4 + fraction for level in LEVELS for fraction in (0.0, 0.19)]
     answers = yield [ask_of(traits, throw, level, 11) for throw in throws for level in (*levels, 2)]
     squares = []
     for k in range(0, len(answers), len(levels) + 1):
@@ -212,10 +227,10 @@ def check_order_across(traits: Traits) -> Making:
     low = min(declared, 1.0) - 0.5
     located = order < low and errors[-1] <= LOCATED
     limited = f"; a tolerance of event location limits it at {errors[-1]:.1g}" if located else ""
-    return Found(
+    return Observation(
         holds=order >= low or located,
         expected=f"order {low:g} or more, or errors below {LOCATED:g} of omega_0",
-        came=f"{order:.2f}, {errors[-1]:.2g} of omega_0 at the finest{limited}",
+        observed=f"{order:.2f}, {errors[-1]:.2g} of omega_0 at the finest{limited}",
         where=f"{throws[0].n_slices} to {throws[-1].n_slices} slices, 0.3 s with impacts on both ends, steps of 5 ms "
         "and its halves",
         advice="rebounds answered at the next step give order 1; an order near 0 means that refinement does not help",
@@ -223,7 +238,7 @@ def check_order_across(traits: Traits) -> Making:
     )
 
 
-def check_floor(traits: Traits) -> Making:
+def check_floor(traits: Traits) -> CheckGenerator:
     """Refined until changes stop shrinking, a solver in float64 goes below 2e-8 of omega_0 or is still shrinking."""
     if traits.refined_by is None:
         raise NotApplicableError("refined_by is not declared")
@@ -236,16 +251,16 @@ def check_floor(traits: Traits) -> Making:
     for level in range(start + 2 * stride, deepest + 1, stride):
         if stopped:
             break
-        # By steps shorter by a sixteenth a change as large as by steps a quarter as long is noise. With another
-        # tolerance a solver takes other steps altogether: there, a change next to none says nothing.
-        near = [level + math.log2(17 / 16)] if level < deepest and traits.refined_by != "rtol" else []
+        # If steps a sixteenth shorter change as much as steps a quarter as long, the change is noise. With another
+        # tolerance a solver takes entirely different steps: this test then says nothing.
+        near_levels = [level + math.log2(17 / 16)] if level < deepest and traits.refined_by != "rtol" else []
         coarse = fine
         try:
-            fine, *beside = yield [ask_of(traits, SMOOTH, depth) for depth in (level, *near)]
-        except ForeignError:  # so many steps may take longer than a run may
+            fine, *neighbours = yield [ask_of(traits, SMOOTH, depth) for depth in (level, *near_levels)]
+        except ForeignError:  # so many steps may exceed the time limit
             break
         changes.append(shift(coarse, fine, SMOOTH.omega0))
-        level_noises = [shift(fine, neighbour, SMOOTH.omega0) for neighbour in beside]
+        level_noises = [shift(fine, neighbour, SMOOTH.omega0) for neighbour in neighbours]
         noises += level_noises
         noisy = any(noise > NOISE * changes[-1] for noise in level_noises)
         stopped = changes[-1] <= 16 * traits.epsilon or changes[-1] > STILL * changes[-2] or noisy
@@ -255,10 +270,10 @@ def check_floor(traits: Traits) -> Making:
     weak = stopped and floor > admissible
     count = len(changes)
     ended = "steps grow no shorter" if capped else "no longer falling" if stopped else "still falling"
-    return Found(
+    return Observation(
         holds=not weak or floor <= COARSE or capped,
         expected=f"changes fall below {admissible:.0e} of omega_0, or still fall",
-        came=f"{floor:.2g} of omega_0 after {count} refinement{'s' if count > 1 else ''}, {ended}",
+        observed=f"{floor:.2g} of omega_0 after {count} refinement{'s' if count > 1 else ''}, {ended}",
         where="0.05 s before any impact",
         advice="look for a tolerance, a cut-off or rounded numbers that do not refine",
         weak=f"refinement ends at {floor:.1g} of omega_0" if weak else "",
@@ -267,13 +282,13 @@ def check_floor(traits: Traits) -> Making:
 
 
 COARSE: Final = 1e-4
-"""Floor of refinement, fraction of omega_0, that is a weakness; above it refinement does not help."""
+"""Floor of refinement, fraction of omega_0, up to which it is a weakness; above it refinement does not help."""
 
 
 def _singles(answer: Answer) -> list[str]:
-    """Return the names of the fields whose numbers, 20 different ones at the least, are those of float32.
+    """Return the names of the fields whose numbers, at least 20 different ones, are float32 numbers.
 
-    A number that was printed with nine digits or more is within a tenth of their spacing.
+    A float32 number printed with nine digits or more is within a tenth of their spacing.
     """
     names = []
     for name in ("theta", "omega", "r", "v"):
@@ -298,7 +313,7 @@ PIECES: Final = (
 """Throws with and without weight, drag, and rests on both ends, of an even and an odd number of slices."""
 
 
-def check_piecewise(traits: Traits) -> Making:
+def check_piecewise(traits: Traits) -> CheckGenerator:
     """From the solver's own state at each output the equation leads to the next."""
     place = yield from placing(traits)
     equation = traits.equation or place.equation
@@ -307,11 +322,11 @@ def check_piecewise(traits: Traits) -> Making:
         raise NotApplicableError("told by the check of the equation")
     if traits.equation is None and not place.on_lattice:
         raise NotApplicableError("no equation is declared")
-    came, advice = yield from departures.departing(traits, declared, [knobs.ask(0) for knobs in PIECES])
-    return Found(
-        holds=not came,
+    departure, advice = yield from departures.departing(traits, declared, [knobs.ask(0) for knobs in PIECES])
+    return Observation(
+        holds=not departure,
         expected=f"{declared} from one output to the next",
-        came=f"departs {came}" if came else "no departure beyond the step's own error",
+        observed=f"departs {departure}" if departure else "no departure beyond the step's own error",
         where=f"{len(PIECES)} throws, begun anew from the solver's own state at each of {departures.OUTPUTS} outputs",
         advice=advice,
     )
@@ -325,12 +340,12 @@ RESTITUTION_ROOM: Final = 0.003
 
 
 PLACE_ROOM: Final = 0.004
-"""How far beyond or before its end a slice may turn, fraction of the bottle's length: one that waits for the grid."""
+"""How far beyond or before its end a slice may turn, fraction of the bottle's length, if it waits for the grid."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rebound:
-    """One impact as it was measured: ``speed`` before it [m/s], ``restitution``, at ``time`` [s].
+    """One measured impact: ``speed`` before it [m/s], ``restitution``, at ``time`` [s].
 
     ``beyond`` is how far the slice turns beyond its end, as a fraction of the bottle's length.
     """
@@ -350,7 +365,7 @@ class Rebound:
 
     @property
     def misplaced(self) -> bool:
-        """Whether the slice turns elsewhere than at its end."""
+        """Whether the slice turns somewhere other than at its end."""
         return not abs(self.beyond) <= PLACE_ROOM + self.room / 2
 
 
@@ -367,12 +382,12 @@ def throw_of(spin: float) -> Scenario:
 def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
     """Return the first impact of one slice on ``end``, with or without a rebound; None if it reaches no end.
 
-    The last slice strikes the cap first, the second one the base. A slice has struck that keeps less than 0.6 of its
-    speed from one sample to the next. Speeds are the slopes of two parabolas where they meet, each through ``near``
-    samples before and after the turn; the two next to it are left out.
+    The last slice strikes the cap first, the second one the base. A slice that keeps less than 0.6 of its speed from
+    one sample to the next has struck. Speeds are the slopes of two parabolas where they meet, each through
+    ``samples`` samples before and after the turn; the two next to it are left out.
     """
     assert answer.r is not None
-    near, slowed = 6, 0.6
+    samples, slowed = 6, 0.6
     side, index = (-1.0, scenario.n_slices - 1) if end == "cap" else (1.0, 1)
     x = side * answer.r[:, index]
     wall = side * (scenario.r_min if end == "cap" else scenario.r_max)
@@ -381,11 +396,11 @@ def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
     fast_enough = v[:-1] > slowed * np.maximum.accumulate(v)[:-1]
     struck = fast_enough & (v[1:] < slowed * v[:-1]) & (wall - x[1:-1] < 0.1 * scenario.bottle.length)
     turns = np.flatnonzero(struck) + 1
-    if not turns.size or turns[0] < near + 2 or turns[0] + near + 2 >= len(x):
+    if not turns.size or turns[0] < samples + 2 or turns[0] + samples + 2 >= len(x):
         return None
     k = int(turns[0])
-    before = np.polyfit(np.arange(-near - 1, -1), x[k - near - 1 : k - 1], 2)
-    after = np.polyfit(np.arange(2, 2 + near), x[k + 2 : k + 2 + near], 2)
+    before = np.polyfit(np.arange(-samples - 1, -1), x[k - samples - 1 : k - 1], 2)
+    after = np.polyfit(np.arange(2, 2 + samples), x[k + 2 : k + 2 + samples], 2)
     crossing = np.roots(np.polysub(before, after))
     crossing = crossing[np.abs(crossing.imag) < 1e-9].real
     s = float(crossing[np.argmin(np.abs(crossing))]) if crossing.size else 0.0
@@ -397,61 +412,63 @@ def measure(answer: Answer, scenario: Scenario, end: str) -> Rebound | None:
     return Rebound(end, scenario.omega0, fast, -slow / fast, float(answer.t[k]), beyond)
 
 
-def check_restitution(traits: Traits) -> Making:
+def check_restitution(traits: Traits) -> CheckGenerator:
     """A slice leaves an end with e times the speed at which it struck, at both ends and at every speed."""
-    spins = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # with them first impacts come at 0.05 to 4 m/s
+    spins = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # first impacts at 0.05 to 4 m/s
     answers = yield [_ask_of_rebounds(traits, spin) for spin in spins]
     if answers[0].r is None:
         raise NotApplicableError("no r is given")
-    curve = _rebounds(traits, spins, answers)
-    if not curve:
+    rebounds = _rebounds(traits, spins, answers)
+    if not rebounds:
         raise NotApplicableError("no slice reaches an end")
-    if traits.refined_by and any(not r.holds for r in curve):
+    if traits.refined_by and any(not r.holds for r in rebounds):
         finer = yield [_ask_of_rebounds(traits, spin, 3) for spin in spins]
         restitutions = {(r.end, r.spin): r.restitution for r in _rebounds(traits, spins, finer)}
         change = {
-            key: abs(r.restitution - restitutions[key]) for r in curve if (key := (r.end, r.spin)) in restitutions
+            key: abs(r.restitution - restitutions[key]) for r in rebounds if (key := (r.end, r.spin)) in restitutions
         }
-        curve = [replace(r, room=r.room + min(0.05, 3 * change.get((r.end, r.spin), 0.0))) for r in curve]
-    facts: dict[str, Any] = {"restitution": [(r.end, r.speed, r.restitution) for r in curve], "asked": RESTITUTION}
-    wrong = [r for r in curve if not r.holds]
-    worst = max(wrong or curve, key=lambda r: abs(r.restitution - RESTITUTION) - r.room)
-    expected, came, advice = f"e = {RESTITUTION} within {worst.room:.2g}", f"e = {worst.restitution:.4f}", ""
+        rebounds = [replace(r, room=r.room + min(0.05, 3 * change.get((r.end, r.spin), 0.0))) for r in rebounds]
+    facts: dict[str, Any] = {"restitution": [(r.end, r.speed, r.restitution) for r in rebounds], "asked": RESTITUTION}
+    wrong = [r for r in rebounds if not r.holds]
+    worst = max(wrong or rebounds, key=lambda r: abs(r.restitution - RESTITUTION) - r.room)
+    expected, observed, advice = f"e = {RESTITUTION} within {worst.room:.2g}", f"e = {worst.restitution:.4f}", ""
     if not wrong:
-        speeds = [r.speed for r in curve]
-        came += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
-        where = f"{len(curve)} first impacts"
+        speeds = [r.speed for r in rebounds]
+        observed += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
+        where = f"{len(rebounds)} first impacts"
     elif all(r.misplaced for r in wrong if r.end == wrong[0].end):
         expected = "r = h/2 at the cap, L - h/2 at the base, h the height of a slice"
-        came = f"slices turn {abs(wrong[0].beyond):.2g} of L {'beyond' if wrong[0].beyond > 0 else 'before'} that"
+        observed = f"slices turn {abs(wrong[0].beyond):.2g} of L {'beyond' if wrong[0].beyond > 0 else 'before'} that"
         where = f"{wrong[0].end}, {wrong[0].speed:.3g} m/s"
         advice = "a slice strikes when its surface does: h = water mass / capacity x L / N"
-    elif (threshold := (yield from _threshold(traits, curve))) is not None:
+    elif (threshold := (yield from _threshold(traits, rebounds))) is not None:
         low, high = threshold
         facts["threshold"] = [low, high]
         expected += " at every speed"
-        came = f"none below {(low + high) / 2:.3g} +- {(high - low) / 2:.1g} m/s, a velocity threshold"
+        observed = f"none below {(low + high) / 2:.3g} +- {(high - low) / 2:.1g} m/s, a velocity threshold"
         where = f"{wrong[0].end}, {wrong[0].speed:.3g} m/s: e = {wrong[0].restitution:.3f}"
         advice = "scale lengths up so that impacts are faster than the threshold, or lower it in the engine"
     else:
         where = f"{worst.end}, struck at {worst.speed:.3g} m/s, t = {worst.time:.4g} s"
         advice = "the speed after an impact, relative to the bottle, is e times the speed before it"
-        if {r.end for r in wrong} == {"cap"} and any(r.end == "base" for r in curve):
+        if {r.end for r in wrong} == {"cap"} and any(r.end == "base" for r in rebounds):
             advice += "; right at the base: look at e at the cap, and at the slices that rest on the base "
             advice += "when one strikes the cap, which take part in that impact"
-    return Found(holds=not wrong, expected=expected, came=came, where=where, advice=advice, facts=facts)
+    return Observation(holds=not wrong, expected=expected, observed=observed, where=where, advice=advice, facts=facts)
 
 
 def _rebounds(traits: Traits, spins: Sequence[float], answers: Sequence[Answer]) -> list[Rebound]:
-    """Return what was measured at both ends; numbers of few digits leave speeds less sure."""
+    """Return the rebounds measured at both ends; few printed digits widen their room."""
     rebounds = []
     for end in ("base", "cap"):
         for spin, answer in zip(spins, answers, strict=True):
             throw = throw_of(spin)
             if (rebound := measure(answer, throw, end)) is not None:
-                unsure = 4 * traits.epsilon * throw.bottle.length / float(answer.t[1] - answer.t[0]) / rebound.speed
-                if unsure < RESTITUTION / 4:  # else it is too slow to be measured
-                    rebounds.append(replace(rebound, room=RESTITUTION_ROOM + unsure))
+                uncertainty = (
+                    4 * traits.epsilon * throw.bottle.length / float(answer.t[1] - answer.t[0]) / rebound.speed
+                )
+                if uncertainty < RESTITUTION / 4:  # else it is too slow to be measured
+                    rebounds.append(replace(rebound, room=RESTITUTION_ROOM + uncertainty))
     return rebounds
 
 
@@ -460,11 +477,11 @@ def _ask_of_rebounds(traits: Traits, spin: float, level: int = 2) -> Ask:
 
 
 def _threshold(
-    traits: Traits, curve: Sequence[Rebound]
+    traits: Traits, measured: Sequence[Rebound]
 ) -> Generator[Sequence[Ask], Sequence[Answer], tuple[float, float] | None]:
-    """Return speeds [m/s] between which rebounds begin, if slow impacts have none and fast ones the right one."""
+    """Return the speeds [m/s] between which rebounds begin, if slow impacts have none and fast ones are right."""
     for end in ("cap", "base"):
-        rebounds = sorted((r for r in curve if r.end == end), key=lambda r: r.speed)
+        rebounds = sorted((r for r in measured if r.end == end), key=lambda r: r.speed)
         dead = [r for r in rebounds if abs(r.restitution) < RESTITUTION / 4]
         live = [r for r in rebounds if abs(r.restitution - RESTITUTION) <= 4 * RESTITUTION_ROOM]
         if not dead or not live or dead[-1].speed > live[0].speed or len(dead) + len(live) < len(rebounds):

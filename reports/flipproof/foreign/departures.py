@@ -1,8 +1,8 @@
 """Where a solver departs from its equation: the reference carries on from the solver's own state, output by output.
 
-From the state at each output the reference flies to the next one. What the solver answers there besides is not handed
-down from earlier: it comes from what went on between the two. So a departure is counted by what that was (``SORTS``),
-and measured by what it is made of (``causes``). Needs r and v.
+From the state at each output the reference flies to the next one. Any difference there is not inherited from earlier
+outputs: it arises between the two. So departures are counted by what happens there (``CATEGORIES``), and analysed by
+what they consist of (``causes``). Needs r and v.
 """
 
 from __future__ import annotations
@@ -18,49 +18,49 @@ from numpy.typing import NDArray
 from flipproof.foreign.causes import cause_of, rms
 from flipproof.foreign.checking import NotApplicableError, effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
-from flipproof.foreign.interval import FLOOR, Interval, carried_on
+from flipproof.foreign.interval import FLOOR, Interval, intervals_of
 from flipproof.foreign.place import switches_of
 from slicemodel.trajectory import BASE, CAP
 
 BoolArray = NDArray[np.bool_]
 
 OUTPUTS: Final = 160
-"""Outputs of a throw at which the reference begins anew."""
+"""Outputs of a throw at which the reference is restarted."""
 
 LOCATED: Final = 1e-4
-"""``FLOOR`` across an impact, whose time may be found by a tolerance."""
+"""``FLOOR`` across an impact, whose time may be located to a tolerance only."""
 
 SPOILED: Final = 5e-5
-"""Departure at impacts that come alone, at a quarter of the step, from which on they cost an order of 2 or more.
+"""Departure at isolated impacts, at a quarter of the step, from which on they spoil an order of 2 or more.
 
-Right solvers of such an order among the benchmarks leave 1e-6 there at the most, mistakes 1e-4 and more.
+Right solvers of such an order among the benchmarks leave at most 1e-6 there, mistakes 1e-4 and more.
 """
 
 LEVELS: Final = (0, 2, 4)
-"""Levels of refinement; the last one only of what departs at the others."""
+"""Levels of refinement; the last one only if there are departures at the others."""
 
 FALLS: Final = 0.4
-"""Share of a departure that is left at a quarter of the step, if the step alone makes it."""
+"""Fraction of a departure that remains at a quarter of the step, if only the step causes it."""
 
 NAMES: Final = {BASE: "base", CAP: "cap"}
 
 
-Sort = tuple[Callable[[Interval], bool], str]
+Category = tuple[Callable[[Interval], bool], str]
 
 
-def _of_end(end: int) -> dict[str, Sort]:
-    """Return what may go on at one end."""
-    here, there = NAMES[end], NAMES[-end]
+def _end_categories(end: int) -> dict[str, Category]:
+    """Return what may happen at one end."""
+    name, opposite = NAMES[end], NAMES[-end]
     return {
-        f"with an impact on the {here}": (lambda i: i.strikes(end), "impacts"),
-        f"in which slices rest on the {here}": (lambda i: i.rests(end), "rests"),
-        f"in which a slice comes to rest on the {here}": (lambda i: i.settles(end), "begin of rests"),
-        f"in which a slice is let go from the {here}": (lambda i: i.leaves(end), "end of rests"),
-        f"with an impact on the {here} while others rest there": (
+        f"with an impact on the {name}": (lambda i: i.strikes(end), "impacts"),
+        f"in which slices rest on the {name}": (lambda i: i.rests(end), "rests"),
+        f"in which a slice comes to rest on the {name}": (lambda i: i.settles(end), "begin of rests"),
+        f"in which a slice is let go from the {name}": (lambda i: i.leaves(end), "end of rests"),
+        f"with an impact on the {name} while others rest there": (
             lambda i: i.strikes_beside(end, end),
             "impacts on rests",
         ),
-        f"with an impact on the {here} while others rest on the {there}": (
+        f"with an impact on the {name} while others rest on the {opposite}": (
             lambda i: i.strikes_beside(end, -end),
             "impacts on rests",
         ),
@@ -69,7 +69,7 @@ def _of_end(end: int) -> dict[str, Sort]:
 
 ENDS: Final = (BASE, CAP)
 
-SORTS: Final[Mapping[str, Sort]] = {
+CATEGORIES: Final[Mapping[str, Category]] = {
     "": (lambda _: True, ""),
     "in which nothing strikes an end": (lambda i: not i.hits, ""),
     "with an impact": (lambda i: bool(i.hits), "impacts"),
@@ -89,10 +89,10 @@ SORTS: Final[Mapping[str, Sort]] = {
     "where there is no drag": (lambda i: i.throw.drag == 0, "drag"),
     "of an odd number of slices": (lambda i: i.throw.n_slices % 2 == 1, "odd"),
     "in which slices rest while there is drag": (lambda i: i.throw.drag > 0 and any(map(i.rests, ENDS)), "rests"),
-    **_of_end(BASE),
-    **_of_end(CAP),
+    **_end_categories(BASE),
+    **_end_categories(CAP),
 }
-"""What may go on between two outputs, in words, the general before the special, and a key of ``LOOK_AT``."""
+"""What may happen between two outputs, the general before the special: phrase -> (test, key of ``LOOK_AT``)."""
 
 LOOK_AT: Final[Mapping[str, str]] = {
     "impacts": "what an impact does",
@@ -106,52 +106,52 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "odd": "the loop over slices: every slice moves, also the last of an odd number",
     "impacts on rests": "the part of slices at rest in the impact of another",
 }
-"""By what goes on between two outputs, what to look at."""
+"""What to look at, by what happens between two outputs."""
 
 FEW: Final = 3
-"""Intervals that depart before anything is said: rounding may put one impact before an output or behind it."""
+"""Fewest departing intervals that are reported: rounding may move one impact to the other side of an output."""
 
 SURE: Final = 0.9
-"""Share of the departures that a sort must hold where none holds them all."""
+"""Fraction of the departures that a category must hold if none holds them all."""
 
 
-Departing = Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]
+DepartureGenerator = Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]
 
 
-def departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> Departing:
-    """Return between which outputs of throws a solver departs from an equation, and by what; nothing if it does not.
+def departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureGenerator:
+    """Return between which outputs of throws a solver departs from an equation, and by what; empty if it does not.
 
-    Asks for each throw again, at ``OUTPUTS`` times, at two levels or three if the solver can be refined. Raises
-    NotApplicableError if it answers no r or v.
+    Asks for each throw again, at ``OUTPUTS`` times, at two or three levels if the solver can be refined. Raises
+    NotApplicableError if the answers lack r or v.
     """
     if traits.refined_by is None:
-        intervals = yield from _flown(traits, equation, asks, 0)
-        astray = _astray(traits, intervals, None)
-        return _told(equation, intervals, astray) if astray.sum() >= FEW else ("", "")
+        intervals = yield from _intervals_at(traits, equation, asks, 0)
+        departs = _departs(traits, intervals, None)
+        return _describe(equation, intervals, departs) if departs.sum() >= FEW else ("", "")
     coarse: list[Interval] = []
     spoiled = ("", "")
     for level in LEVELS:
         try:
-            intervals = yield from _flown(traits, equation, asks, level)
+            intervals = yield from _intervals_at(traits, equation, asks, level)
         except ForeignError:
-            if coarse:  # too slow for so fine steps
+            if coarse:  # too slow for such fine steps
                 return spoiled
             if level == LEVELS[-1]:
                 raise
             continue
         if coarse:
-            if came := _passed_over(coarse, intervals):
-                words = "the slice goes on as before it: an answer between two steps must know of an impact on its way"
-                return came, words
+            if passed_over := _passed_over(coarse, intervals):
+                advice = "the slice goes on as before it: an answer between two steps must know of an impact on its way"
+                return passed_over, advice
             spoiled = max(spoiled, _spoiled(traits, coarse, intervals))
-            astray = _astray(traits, intervals, coarse)
-            if astray.sum() < FEW:
+            departs = _departs(traits, intervals, coarse)
+            if departs.sum() < FEW:
                 return spoiled
         coarse = intervals
-    return _told(equation, intervals, astray)
+    return _describe(equation, intervals, departs)
 
 
-def _flown(
+def _intervals_at(
     traits: Traits, equation: str, asks: Sequence[Ask], level: float
 ) -> Generator[Sequence[Ask], Sequence[Answer], list[Interval]]:
     """Ask for throws at one level, and carry on from the state at each output to the next."""
@@ -166,15 +166,15 @@ def _flown(
     return [
         interval
         for number, (ask, answer) in enumerate(zip(dense, answers, strict=True))
-        for interval in carried_on(equation, number, ask, answer)
+        for interval in intervals_of(equation, number, ask, answer)
     ]
 
 
-def _astray(traits: Traits, fine: Sequence[Interval], coarse: Sequence[Interval] | None) -> BoolArray:
+def _departs(traits: Traits, fine: Sequence[Interval], coarse: Sequence[Interval] | None) -> BoolArray:
     """Return which intervals depart by more than a step's own error, a faint rest, or a tolerance of event location.
 
-    Intervals of a kind have one error of the step, which falls with refinement. Of a solver that cannot be refined it
-    is that of the intervals in which all slices fly, and impacts, which may wait for its next step, are not judged.
+    Intervals of one kind share the error of the step, which falls with refinement. If the solver cannot be refined, it
+    is taken from the intervals in which all slices fly; impacts, which may wait for its next step, are left out.
     """
     kinds = np.array([kind_of(interval) for interval in fine])
     sizes = np.array([interval.size for interval in fine])
@@ -185,37 +185,39 @@ def _astray(traits: Traits, fine: Sequence[Interval], coarse: Sequence[Interval]
         floor = np.maximum(floor, 30 * rms(flights)) if len(flights) else np.full(len(fine), np.inf)
         floor[kinds == "impact"] = np.inf
         return np.asarray(sizes > floor)
-    astray = np.zeros(len(fine), dtype=bool)
+    departs = np.zeros(len(fine), dtype=bool)
     for kind in set(kinds.tolist()):
         before = [interval.size for interval in coarse if kind_of(interval) == kind]
         size = rms(sizes[kinds == kind])
         if not before or size > FALLS * rms(before):
-            astray |= (kinds == kind) & (sizes > np.maximum(floor, 0.03 * size))
-    return astray
+            departs |= (kinds == kind) & (sizes > np.maximum(floor, 0.03 * size))
+    return departs
 
 
 def _spoiled(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval]) -> tuple[str, str]:
-    """Return that impacts cost the order which flights have, as ``_told`` does, unless slices only leave an end late.
+    """Return, as ``_describe`` does, that impacts spoil the order of flights, unless slices only leave an end late.
 
-    To answer an impact at the end of its step is a choice; its error, too, falls no faster than the step.
+    Applying an impact at the end of its step is a legitimate choice, though its error falls no faster than the step.
     """
     lone = [_lone(intervals) for intervals in (coarse, fine)]
     if (traits.order or 0.0) < 2.0 or min(map(len, lone)) < 2 * FEW:
         return "", ""
-    long, short = (float(np.median([interval.size for interval in intervals])) for intervals in lone)
-    late = np.mean([(i.due["r"] - i.r[1])[i.hits[0][0]] * i.due["v"][i.hits[0][0]] > 0.0 for i in lone[1]])
-    if short < SPOILED or long > 6 * short or late > SURE:
+    coarse_size, fine_size = (float(np.median([interval.size for interval in intervals])) for intervals in lone)
+    late_share = np.mean(
+        [(i.expected["r"] - i.r[1])[i.hits[0][0]] * i.expected["v"][i.hits[0][0]] > 0.0 for i in lone[1]]
+    )
+    if fine_size < SPOILED or coarse_size > 6 * fine_size or late_share > SURE:
         return "", ""
     return (
-        f"at impacts that come alone, by {long:.1g} of a field's scale (median of {len(lone[0])}) and by {short:.1g} "
-        "at a quarter of the step",
+        f"at impacts that come alone, by {coarse_size:.1g} of a field's scale (median of {len(lone[0])}) and by "
+        f"{fine_size:.1g} at a quarter of the step",
         "steps without an impact have a higher order: look at the instant of the speed with which a slice strikes, "
         "and at the rest of the step after the impact",
     )
 
 
 def _passed_over(coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:
-    """Return how often a slice still moves towards the end that it struck well before, if seldom with short steps."""
+    """Return how often a slice still moves towards the end that it struck well before, if rarely with short steps."""
     counts = []
     for intervals in (coarse, fine):
         lone = [
@@ -225,14 +227,14 @@ def _passed_over(coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:
             and not (before.hits or i.before.any())
             and 0.05 < i.hits[0][2] / i.throw.duration < 0.95
         ]
-        counts.append(sum(i.v[1][i.hits[0][0]] * i.due["v"][i.hits[0][0]] < 0.0 for i in lone))
+        counts.append(sum(i.v[1][i.hits[0][0]] * i.expected["v"][i.hits[0][0]] < 0.0 for i in lone))
     if counts[0] < FEW or counts[1] > counts[0] / 2:
         return ""
     return f"after {counts[0]} impacts with none shortly before, and after {counts[1]} at a quarter of the step"
 
 
 def _lone(intervals: Sequence[Interval]) -> list[Interval]:
-    """Return the intervals with one impact while no slice rests, and none in the intervals beside them."""
+    """Return the intervals with one impact, no slice at rest, and no impact in the neighbouring intervals."""
     hits = [len(interval.hits) for interval in intervals]
     return [
         interval
@@ -242,7 +244,7 @@ def _lone(intervals: Sequence[Interval]) -> list[Interval]:
 
 
 def kind_of(interval: Interval) -> str:
-    """Return what tells apart intervals whose own errors differ."""
+    """Return the kind of an interval; intervals of one kind have similar errors of their own."""
     if interval.hits:
         return "impact"
     if np.any(interval.before != interval.after):
@@ -250,39 +252,42 @@ def kind_of(interval: Interval) -> str:
     return "rest" if interval.before.any() else "flight"
 
 
-def _told(equation: str, intervals: Sequence[Interval], astray: BoolArray) -> tuple[str, str]:
-    """Return the sort of the intervals that depart, and by what they do.
+def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) -> tuple[str, str]:
+    """Return the category of the intervals that depart, and by what they depart.
 
-    It is the sort that holds all of them and few others; if none does that well, one that holds nearly all.
+    It is the category that holds all of them and few others; if none does so well, one that holds nearly all.
     """
-    wrong = int(astray.sum())
-    words, look_at, members = "", "", np.ones(len(intervals), dtype=bool)
-    for least in (1.0, SURE):
-        best = 2 * wrong / (len(intervals) + wrong)  # as good as all intervals
-        for name, (holds, about) in _sorts_of(intervals).items():
+    total = int(departs.sum())
+    category, look_at, members = "", "", np.ones(len(intervals), dtype=bool)
+    for min_share in (1.0, SURE):
+        best = 2 * total / (len(intervals) + total)  # as good as all intervals
+        for name, (holds, key) in _categories_of(intervals).items():
             inside = np.array([holds(interval) for interval in intervals])
-            both = int(np.sum(inside & astray))
-            score = 2 * both / (int(inside.sum()) + wrong)
-            if both >= least * wrong and score > best + 0.02:
-                best, words, look_at, members = score, name, about, inside
-        if words:
+            common = int(np.sum(inside & departs))
+            score = 2 * common / (int(inside.sum()) + total)
+            if common >= min_share * total and score > best + 0.02:
+                best, category, look_at, members = score, name, key, inside
+        if category:
             break
-    both, count = int(np.sum(members & astray)), int(members.sum())
-    others = f", in {wrong - both or 'none'} of the {len(intervals) - count} others" if words else ""
-    came = f"in {both} of {count} intervals between two outputs{words and ' ' + words}{others}"
-    departed = [interval for interval, departs in zip(intervals, members & astray, strict=True) if departs]
-    what = cause_of(departed, recoil=switches_of(equation).recoil)
-    if "look at" in what or (what and look_at in ("weight", "drag", "odd")):  # the terms are named
+    common, count = int(np.sum(members & departs)), int(members.sum())
+    outside = f", in {total - common or 'none'} of the {len(intervals) - count} others" if category else ""
+    where = f"in {common} of {count} intervals between two outputs{category and ' ' + category}{outside}"
+    departed = [interval for interval, chosen in zip(intervals, members & departs, strict=True) if chosen]
+    cause = cause_of(departed, recoil=switches_of(equation).recoil)
+    if "look at" in cause or (cause and look_at in ("weight", "drag", "odd")):  # the terms are named
         look_at = ""
     advice = f"look at {LOOK_AT[look_at]}" if look_at else ""
-    return came, "; ".join(part for part in (what, advice) if part)
+    return where, "; ".join(part for part in (cause, advice) if part)
 
 
-def _sorts_of(intervals: Sequence[Interval]) -> Mapping[str, Sort]:
-    """Return the sorts, also one a restitution if there are several."""
+def _categories_of(intervals: Sequence[Interval]) -> Mapping[str, Category]:
+    """Return the categories, with one for each restitution if there are several."""
     restitutions = sorted({interval.throw.restitution for interval in intervals})
-    return {**SORTS, **{f"with an impact at e = {e:.3g}": _impact_at(e) for e in restitutions if len(restitutions) > 1}}
+    return {
+        **CATEGORIES,
+        **{f"with an impact at e = {e:.3g}": _impact_at(e) for e in restitutions if len(restitutions) > 1},
+    }
 
 
-def _impact_at(restitution: float) -> Sort:
+def _impact_at(restitution: float) -> Category:
     return lambda i: bool(i.hits) and i.throw.restitution == restitution, "impacts"

@@ -1,16 +1,16 @@
 """Throws that differ from those of the other checks in everything at once, and what a solver gets wrong there.
 
 A throw is a set of ``Knobs``: bottle, filling, slices, start, spin, weight, drag, restitution, output times. ``drawn``
-takes them from a seed, so that no solver is tuned to them. Each answer is compared with the exact solution of its
+draws them by a seed, so that no solver is tuned to them. Each answer is compared with the exact solution of its
 equation in every field that it gives:
 
     abs(answer - reference) <= room(t) = FLOOR + OWN x own error(t) + BAND x band(t)
 
 own error   change of the answer under refinement; it grows with the flight, so its running maximum counts
-band        change of the reference with a release that differs by 1e-6 and with another rest speed: what no solver owes
+band        change of the reference with a release that differs by 1e-6 and with another rest speed: no solver's fault
 
-Where the room exceeds ``BLURRED`` nothing is judged. Of a throw that is wrong each knob is turned alone, from the
-paper's throw or back to it, until one of them tells right from wrong.
+Where the room exceeds ``BLURRED`` nothing is compared. If a throw is wrong, each knob is turned alone, from the
+paper's throw or back to it, until one of them separates right from wrong.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any, Final
 import numpy as np
 
 import ode_reference
-from flipproof.foreign.checking import THROW, Found, Making, NotApplicableError, effort_of
+from flipproof.foreign.checking import THROW, CheckGenerator, NotApplicableError, Observation, effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import name_of, placing, switches_of
@@ -44,24 +44,24 @@ FLOOR: Final = 1e-4
 OWN: Final = 5.0
 BAND: Final = 2.0
 BLURRED: Final = 0.1
-"""Room of omega, fraction of omega_0, from which on a throw tells nothing more."""
+"""Room of omega, fraction of omega_0, above which a throw tells nothing."""
 
 WEAK: Final = 0.01
-"""Own error of omega, fraction of omega_0, from which on it hides what the check is there for."""
+"""Own error of omega, fraction of omega_0, above which it hides what the check is looking for."""
 
 STRAY: Final = 0.03
-"""Share of the values of v that may be off: a slice turns round at an impact, and an output time may lie beside it."""
+"""Fraction of the values of v that may be off: v jumps at an impact, and an output time may lie close to it."""
 
 LEVELS: Final = ((-1.3, -1.9, -2.6), (1, 0.4, -0.3), (3, 2.4, 1.7))
-"""Levels of refinement, finer ones where coarser ones leave an own error that counts, or hide it.
+"""Levels of refinement, finer ones where coarser ones leave an own error that matters, or hide it.
 
-No step of one is a multiple of another's, so that none shares the luck of its grid.
+No step is a multiple of another, so that no two share output times by chance.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Knobs:
-    """What a throw is made of; SI units, ``damping`` is alpha / m [1/s], ``angle`` is abs(omega_0) T [rad]."""
+    """The parameters of a throw; SI units, ``damping`` is alpha / m [1/s], ``angle`` is abs(omega_0) T [rad]."""
 
     mass: float = THROW.bottle.mass
     length: float = THROW.bottle.length
@@ -101,7 +101,7 @@ class Knobs:
         if self.start == "permuted":
             start = np.roll(rng.permutation(start), 1) if self.slices > 2 else start[::-1].copy()
         elif self.start == "scattered" and self.slices == 1:
-            start = np.array([throw.r_min + 0.3 * (throw.r_max - throw.r_min)])  # in the middle nothing pulls it
+            start = np.array([throw.r_min + 0.3 * (throw.r_max - throw.r_min)])  # no force acts on it in the middle
         elif self.start == "in the middle":
             start = far_from_ends(throw)
         elif self.start != "stacked":
@@ -160,11 +160,11 @@ WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "capacity": ("M_max = {:.3g} kg", "the height of a slice is water mass / capacity x L / N"),
     "velocity": ("v_0 = {} m/s", "the flight of the centre of mass does not act inside the bottle"),
 }
-"""Knob -> how it is printed, and what to look at if it tells right from wrong."""
+"""Knob -> how it is printed, and what to look at if it separates right from wrong."""
 
 
-def said(knobs: Knobs, name: str) -> str:
-    """Return one knob in words."""
+def knob_text(knobs: Knobs, name: str) -> str:
+    """Return one knob as text."""
     return WORDS[name][0].format(getattr(knobs, name))
 
 
@@ -184,14 +184,14 @@ FACTORS: Final[Mapping[str, tuple[Any, ...]]] = MappingProxyType(
         "angle": (4.0, 7.0, 13.0),
     }
 )
-"""What is varied, and its levels: ``damping`` as a fraction of omega_0, ``pull`` the weight as a fraction of the
-largest centrifugal force, omega_0^2 L / 2, ``ratio`` the bottle's mass over that of the water: at any spin drag holds
-slices, and weight lifts them, in some throws. What stands in brackets is one level and is taken in turn."""
+"""The factors that are varied, and their levels: ``damping`` as a fraction of omega_0, ``pull`` the weight as a
+fraction of the largest centrifugal force, omega_0^2 L / 2, ``ratio`` the bottle's mass over that of the water: at any
+spin drag holds slices, and weight lifts them, in some throws. Values in brackets are one level and take turns."""
 
 FULL: Final = replace(PAPER, mass=0.05, filling=1.0, damping=0.0, gravity=0.0, theta0=0.7, omega0=-12.0, angle=4.0)
 """A light full bottle: of its four slices two rest on the ends, and two strike both ends at one instant.
 
-Where the tube recoils, rounding decides whether a solver answers these hits together or in turn: neither is accused.
+Where the tube recoils, rounding decides whether a solver applies these hits together or in turn: neither is wrong.
 """
 
 SMALL: Final = replace(
@@ -206,10 +206,10 @@ SMALL: Final = replace(
     omega0=-40.0,
     gravity=2.0,
 )
-"""A bottle of 8 mm with slices of 0.3 mm: a length, mass or drag coefficient that is cut off shows here."""
+"""A bottle of 8 mm with slices of 0.3 mm: shows a cut-off of lengths, masses or drag coefficients."""
 
 SLOW: Final = replace(PAPER, slices=5, start="scattered", omega0=0.45, gravity=0.005, damping=0.05, angle=6.0)
-"""A bottle that turns once in 14 s: a spin, an acceleration or a duration that is cut off shows here."""
+"""A bottle that turns once in 14 s: shows a cut-off of spins, accelerations or durations."""
 
 SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
     {
@@ -225,29 +225,29 @@ SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
         ),
     }
 )
-"""The same flights on other scales: if they are right, what is wrong, and the units of a constant that does it."""
+"""The same flights on other scales; if these are right: what is wrong, and units of the constant to look for."""
 
 COUNT: Final = 16
-"""Throws of a seed: eight of nine pairs of levels of two factors occur together in one of them, all levels do."""
+"""Throws of a seed: they hold every level, and eight of nine pairs of levels of two factors."""
 
 
 def designed(rng: np.random.Generator) -> list[list[int]]:
-    """Return the levels of ``COUNT`` throws, a number a factor: each is the one of 100 with the most new pairs."""
-    sizes, met, rows = [len(levels) for levels in FACTORS.values()], set[tuple[int, ...]](), []
+    """Return the levels of ``COUNT`` throws, one index per factor: each is the one of 100 with the most new pairs."""
+    sizes, covered, rows = [len(levels) for levels in FACTORS.values()], set[tuple[int, ...]](), []
     for _ in range(COUNT):
-        some = [
-            ({(i, j, row[i], row[j]) for i, j in combinations(range(len(sizes)), 2)} - met, row)
+        candidates = [
+            ({(i, j, row[i], row[j]) for i, j in combinations(range(len(sizes)), 2)} - covered, row)
             for row in rng.integers(0, sizes, (100, len(sizes))).tolist()
         ]
-        new, row = max(some, key=lambda candidate: len(candidate[0]))
-        met |= new
+        new, row = max(candidates, key=lambda candidate: len(candidate[0]))
+        covered |= new
         rows.append(row)
     return rows
 
 
 @lru_cache(maxsize=8)
 def drawn(seed: int) -> tuple[Knobs, ...]:
-    """Return the throws of a seed: a small covering design, its numbers moved by some percent."""
+    """Return the throws of a seed: a small covering design, its values perturbed by some percent."""
     rng = np.random.default_rng(seed)
     throws = []
     turns = {
@@ -257,35 +257,37 @@ def drawn(seed: int) -> tuple[Knobs, ...]:
         if isinstance(level, tuple)
     }
     for row in designed(rng):
-        of = {name: levels[level] for (name, levels), level in zip(FACTORS.items(), row, strict=True)}
-        of |= {name: next(turns[level]) for name, level in of.items() if level in turns}
-        moved = dict(zip(FACTORS, (1 + 0.08 * rng.uniform(-1, 1, len(FACTORS))).tolist(), strict=True))
-        slices = of["slices"] + (int(rng.integers(0, 5)) if of["slices"] > 30 else 0)
+        values = {name: levels[level] for (name, levels), level in zip(FACTORS.items(), row, strict=True)}
+        values |= {name: next(turns[level]) for name, level in values.items() if level in turns}
+        factors = dict(zip(FACTORS, (1 + 0.08 * rng.uniform(-1, 1, len(FACTORS))).tolist(), strict=True))
+        slices = values["slices"] + (int(rng.integers(0, 5)) if values["slices"] > 30 else 0)
         # A single slice hardly moves in a light bottle or against strong drag, and not at all in a full one; many in
         # little water hit the base at once.
-        alone = slices == 1
+        single = slices == 1
         length, radius = rng.uniform(0.1, 0.6), rng.uniform(0.02, 0.1)
         fluid = float(rng.choice([700.0, 1000.0, 1000.0, 13_500.0]) * rng.uniform(0.92, 1.08))  # [kg/m^3]
         capacity = fluid * np.pi * radius**2 * length
-        filling = min(max(of["filling"], 0.4 if slices > 30 else 0.0) * moved["filling"], 1.0 if slices > 2 else 0.8)
-        omega0 = of["way"] * of["spin"] * moved["spin"]
+        filling = min(
+            max(values["filling"], 0.4 if slices > 30 else 0.0) * factors["filling"], 1.0 if slices > 2 else 0.8
+        )
+        omega0 = values["way"] * values["spin"] * factors["spin"]
         throws.append(
             Knobs(
-                mass=max(of["ratio"], 1.5 if alone else 0.0) * filling * capacity,
+                mass=max(values["ratio"], 1.5 if single else 0.0) * filling * capacity,
                 length=length,
                 radius=radius,
                 capacity=capacity,
                 filling=filling,
                 slices=slices,
                 # The stack of a full bottle is its own mirror image: rounding decides which of two impacts comes first.
-                start=of["start"] if slices > 2 and filling < 1.0 else "scattered",
-                restitution=of["restitution"] * (moved["restitution"] if of["restitution"] < 1.0 else 1.0),
-                damping=min(of["damping"], 0.15 if alone else 2.5) * moved["damping"] * abs(omega0),
-                gravity=of["pull"] * moved["pull"] * omega0**2 * length / 2,
-                theta0=of["theta0"] * moved["theta0"],
+                start=values["start"] if slices > 2 and filling < 1.0 else "scattered",
+                restitution=values["restitution"] * (factors["restitution"] if values["restitution"] < 1.0 else 1.0),
+                damping=min(values["damping"], 0.15 if single else 2.5) * factors["damping"] * abs(omega0),
+                gravity=values["pull"] * factors["pull"] * omega0**2 * length / 2,
+                theta0=values["theta0"] * factors["theta0"],
                 omega0=omega0,
-                angle=of["angle"] * moved["angle"],
-                times=of["times"],
+                angle=values["angle"] * factors["angle"],
+                times=values["times"],
                 velocity=tuple(rng.uniform(-3.0, 3.0, 2).round(2).tolist()),
             )
         )
@@ -294,21 +296,21 @@ def drawn(seed: int) -> tuple[Knobs, ...]:
 
 
 MAX_IMPACTS: Final = 100
-"""Impacts of a throw beyond one a slice: more, of elastic ones or in a light bottle, say no more and take long."""
+"""Impacts of a throw beyond one per slice: more, if elastic or in a light bottle, tell nothing new and take long."""
 
 FEW_IMPACTS: Final = 20
-"""The same where one knob is turned: after many impacts a right solver's own error counts, too."""
+"""The same if one knob is turned: after many impacts a right solver's own error matters, too."""
 
 
 def _shortened(knobs: Knobs, seed: int, impacts_left: int) -> Knobs:
-    """Return a throw that ends, by Eq. 8 and in free flight, after so many impacts and one more a slice."""
+    """Return the throw, ended after ``impacts_left`` impacts plus one per slice, by Eq. 8 and in free flight."""
     whole = replace(knobs, times="at the end alone").ask(seed)
     share = 1.0
     for model in ("eq8", "free-flight"):
         impacts = ode_reference.solve(started(whole), model, whole.times).impacts
-        last = impacts_left + knobs.slices
-        if impacts is not None and len(impacts.time) > last:
-            share = min(share, 0.99 * float(impacts.time[last]) / whole.scenario.duration)
+        allowed = impacts_left + knobs.slices
+        if impacts is not None and len(impacts.time) > allowed:
+            share = min(share, 0.99 * float(impacts.time[allowed]) / whole.scenario.duration)
     return replace(knobs, angle=share * knobs.angle)
 
 
@@ -316,26 +318,26 @@ def _shortened(knobs: Knobs, seed: int, impacts_left: int) -> Knobs:
 
 
 @lru_cache(maxsize=256)
-def _flown(switches: Switches, throw: Scenario, times: bytes, rest_speed: float) -> Trajectory:
+def _reference_flight(switches: Switches, throw: Scenario, times: bytes, rest_speed: float) -> Trajectory:
     return ode_reference.solve(throw, switches, np.frombuffer(times), rest_speed=rest_speed)
 
 
 def references(equation: str, ask: Ask) -> list[Trajectory]:
-    """Return the exact flight of an equation from the ask's start, and its two twins: in release, in rest speed."""
+    """Return the exact flight of an equation from the ask's start, and twins in release and in rest speed."""
     switches = switches_of(equation)
     throw, usual, times = started(ask), usual_rest_speed(switches.name), ask.times.tobytes()
     bottle = replace(throw.bottle, mass=throw.bottle.mass * (1 + 1e-6))
-    other = replace(throw, bottle=bottle, omega0=throw.omega0 * (1 + 1e-6))
+    perturbed = replace(throw, bottle=bottle, omega0=throw.omega0 * (1 + 1e-6))
     rest = 1e-3 if usual < 1e-3 else 1e-4
     return [
-        _flown(switches, throw, times, usual),
-        _flown(switches, other, times, usual),
-        _flown(switches, throw, times, rest),
+        _reference_flight(switches, throw, times, usual),
+        _reference_flight(switches, perturbed, times, usual),
+        _reference_flight(switches, throw, times, rest),
     ]
 
 
 def scales(ask: Ask, truth: Trajectory) -> dict[str, float]:
-    """Return by field what its differences are fractions of; of the inertia its largest value."""
+    """Return the scale of each field, for relative differences; for the inertia its largest value."""
     throw = ask.scenario
     spin, length = abs(throw.omega0), throw.bottle.length
     return {
@@ -349,34 +351,35 @@ def scales(ask: Ask, truth: Trajectory) -> dict[str, float]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judged:
+class Comparison:
     """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
 
-    ``own`` is the solver's own error of omega where it was judged, ``error`` says why there is no answer, ``since``
-    up to which impact it is right, and ``passed`` how many impacts that are.
+    ``own_error`` is the solver's own error of omega where it was compared, ``largest`` the largest difference of omega,
+    ``share`` the share of output times that were compared. ``error`` says why there is no answer, ``onset`` after which
+    impact it goes wrong, ``impacts_passed`` how many it gets right before.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
-    own: float = 0.0
+    own_error: float = 0.0
     largest: float = 0.0
     share: float = 1.0
     error: str = ""
-    since: str = ""
-    passed: int = 0
+    onset: str = ""
+    impacts_passed: int = 0
 
     @property
-    def farthest(self) -> float:
-        """The largest difference of what is wrong, 0 if nothing is."""
-        return max((off for off, _, _ in self.wrong.values()), default=0.0)
+    def largest_wrong(self) -> float:
+        """The largest difference of the wrong fields, 0 if none is wrong."""
+        return max((difference for difference, _, _ in self.wrong.values()), default=0.0)
 
     @property
     def excess(self) -> float:
         """The largest difference over its room."""
-        return max((off / room for off, room, _ in self.wrong.values()), default=0.0)
+        return max((difference / room for difference, room, _ in self.wrong.values()), default=0.0)
 
 
-def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, unrefined: float) -> Judged:
-    """Judge the answer to one throw; ``answers`` is the finest first, then coarser ones, if it can be refined."""
+def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, unrefined: float) -> Comparison:
+    """Compare the answer to one throw; ``answers`` holds the finest, then coarser ones if the solver can be refined."""
     truth, *twins = references(equation, ask)
     scale = scales(ask, truth)
     reached = min(len(run.t) for run in (truth, *twins))
@@ -388,64 +391,68 @@ def judge(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, un
     def grown(values: FloatArray) -> FloatArray:
         return np.maximum.accumulate(values if values.ndim == 1 else values.max(axis=1))
 
-    mine = answers[0]
+    finest = answers[0]
     floor = max(FLOOR, 1024 * traits.epsilon)
-    given = [name for name in scale if getattr(mine, name) is not None]
+    names = [name for name in scale if getattr(finest, name) is not None]
     rooms: dict[str, FloatArray] = {}
-    owns: dict[str, FloatArray] = {}
-    for name in given:
-        summed = grown if name != "v" else lambda x: np.full(reached, np.quantile(x, 1 - STRAY))
-        own = np.max([np.zeros(reached), *(summed(sizes(mine, coarser, name)) for coarser in answers[1:])], axis=0)
-        owns[name] = own if len(answers) > 1 else np.full(reached, unrefined)
-        rooms[name] = floor + OWN * owns[name] + BAND * sum(summed(sizes(truth, twin, name)) for twin in twins)
+    own_errors: dict[str, FloatArray] = {}
+    for name in names:
+        summarize = grown if name != "v" else lambda x: np.full(reached, np.quantile(x, 1 - STRAY))
+        own_error = np.max(
+            [np.zeros(reached), *(summarize(sizes(finest, coarser, name)) for coarser in answers[1:])], axis=0
+        )
+        own_errors[name] = own_error if len(answers) > 1 else np.full(reached, unrefined)
+        rooms[name] = floor + OWN * own_errors[name] + BAND * sum(summarize(sizes(truth, twin, name)) for twin in twins)
     clear = rooms["omega"] <= BLURRED
     wrong: dict[str, tuple[float, float, float]] = {}
-    first = float(ask.times[-1])
-    for name in given:
-        off = sizes(mine, truth, name)[clear]
+    first_wrong = float(ask.times[-1])
+    for name in names:
+        errors = sizes(finest, truth, name)[clear]
         room = rooms[name][clear]
-        if not off.size:
+        if not errors.size:
             continue
         if name == "v":
-            beyond = off > 10 * room[:, None]
-            if np.count_nonzero(beyond) <= max(2, STRAY * off.size):
+            beyond = errors > 10 * room[:, None]
+            if np.count_nonzero(beyond) <= max(2, STRAY * errors.size):
                 continue
-        rows = off if off.ndim == 1 else off.max(axis=1)
+        rows = errors if errors.ndim == 1 else errors.max(axis=1)
         k = int(np.argmax(rows / room))
         if not rows[k] <= room[k]:
             wrong[name] = float(rows[k]), float(room[k]), float(ask.times[k])
             row = int(np.argmax(rows > room))
-            first = min(first, float(ask.times[:reached][clear][row]))
-    if mine.impacts is not None and clear.any():
+            first_wrong = min(first_wrong, float(ask.times[:reached][clear][row]))
+    if finest.impacts is not None and clear.any():
         room_of_r = rooms.get("r", rooms["omega"])[clear]
-        if late := _unmatched(ask, mine.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]):
-            wrong["impacts"] = late
-    passed, onset = _since(ask, truth.impacts or NO_IMPACTS, first) if wrong else (0, "")
-    return Judged(
+        if unmatched := _unmatched(
+            ask, finest.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]
+        ):
+            wrong["impacts"] = unmatched
+    impacts_passed, onset = _onset(ask, truth.impacts or NO_IMPACTS, first_wrong) if wrong else (0, "")
+    return Comparison(
         wrong=wrong,
-        own=float(np.max(owns["omega"][clear])) if clear.any() else float(owns["omega"].min()),
-        largest=float(np.max(sizes(mine, truth, "omega")[clear], initial=0.0)),
+        own_error=float(np.max(own_errors["omega"][clear])) if clear.any() else float(own_errors["omega"].min()),
+        largest=float(np.max(sizes(finest, truth, "omega")[clear], initial=0.0)),
         share=float(np.mean(clear)) * reached / len(ask.times),
-        since=onset,
-        passed=passed,
+        onset=onset,
+        impacts_passed=impacts_passed,
     )
 
 
-def _since(ask: Ask, impacts: Impacts, first: float) -> tuple[int, str]:
-    """Return how many impacts an answer passes rightly that is wrong at ``first`` [s], and up to which, as a phrase."""
-    right = np.max(ask.times[ask.times < first], initial=0.0)
-    before = int(np.sum(impacts.time <= right))
-    between = np.flatnonzero((impacts.time > right) & (impacts.time < first))
+def _onset(ask: Ask, impacts: Impacts, first_wrong: float) -> tuple[int, str]:
+    """Return how many impacts are right before the first wrong time [s], and after which it goes wrong, as a phrase."""
+    last_right = np.max(ask.times[ask.times < first_wrong], initial=0.0)
+    count = int(np.sum(impacts.time <= last_right))
+    between = np.flatnonzero((impacts.time > last_right) & (impacts.time < first_wrong))
     if not between.size:
-        return before, f"after {before} impacts that were right" if before else "before the first impact"
+        return count, f"after {count} impacts that were right" if count else "before the first impact"
     k = int(between[0])
     together = between[np.abs(impacts.time[between] - impacts.time[k]) < 1e-9 * ask.scenario.duration]
     ends = {"base" if end > 0 else "cap" for end in impacts.end[together].tolist()}
-    which = f"slice {impacts.slice[k]} on the {ends.pop()}"
+    struck = f"slice {impacts.slice[k]} on the {ends.pop()}"
     if len(together) > 1:
-        which = f"slices {', '.join(map(str, impacts.slice[together].tolist()))} {AT_ONCE}"
-    so_far = f"{before} impacts that were right, " if before else ""
-    return before, f"after {so_far}the impact of {which} at {impacts.time[k]:.3g} s"
+        struck = f"slices {', '.join(map(str, impacts.slice[together].tolist()))} {AT_ONCE}"
+    so_far = f"{count} impacts that were right, " if count else ""
+    return count, f"after {so_far}the impact of {struck} at {impacts.time[k]:.3g} s"
 
 
 AT_ONCE: Final = "at one instant"
@@ -458,103 +465,115 @@ FAINT: Final = 0.02
 
 
 def _unmatched(
-    ask: Ask, mine: Impacts, truth: Impacts, room_of_r: FloatArray, times: FloatArray
+    ask: Ask, answered: Impacts, truth: Impacts, room_of_r: FloatArray, times: FloatArray
 ) -> tuple[float, float, float] | None:
-    """Return difference, room and time of the impact that is farthest beyond its room from any of the other list.
+    """Return difference, room and time of the impact that most exceeds its room from any in the other list.
 
-    Impacts of one slice on one end are matched by time and number, up to the last of ``times``; a slice that is
-    ``room_of_r`` off is late by as much over its speed. Fractions of the flight; None if every impact has its match.
+    Impacts of one slice on one end are matched by time and number, up to the last of ``times``; a slice that is off by
+    ``room_of_r`` is late by that over its speed. Fractions of the flight; None if every impact has its match.
     """
     throw, misses = ask.scenario, []
     faint = FAINT * throw.bottle.length * abs(throw.omega0)
-    for one, other in ((mine, truth), (truth, mine)):
-        for k in np.flatnonzero(one.speed_before > faint):
-            when, at = one.time[k], int(np.searchsorted(times, one.time[k]))
-            if at == len(times):
+    for listed, counterpart in ((answered, truth), (truth, answered)):
+        for k in np.flatnonzero(listed.speed_before > faint):
+            time, row = listed.time[k], int(np.searchsorted(times, listed.time[k]))
+            if row == len(times):
                 continue
-            late = float(room_of_r[at]) * throw.bottle.length / one.speed_before[k]
-            room = FLOOR + late / throw.duration
-            near, others = (
-                np.sort(np.abs(hits.time[(hits.slice == one.slice[k]) & (hits.end == one.end[k])] - when))
+            delay = float(room_of_r[row]) * throw.bottle.length / listed.speed_before[k]
+            room = FLOOR + delay / throw.duration
+            own_distances, distances = (
+                np.sort(np.abs(hits.time[(hits.slice == listed.slice[k]) & (hits.end == listed.end[k])] - time))
                 / throw.duration
-                for hits in (one, other)
+                for hits in (listed, counterpart)
             )
-            count = int(np.sum(near <= room))
-            off = float(others[count - 1]) if count <= len(others) else 1.0
-            if off > 2 * room and when + 2 * room * throw.duration < times[-1]:
-                misses.append((off, 2 * room, float(when)))
-    return max(misses, key=lambda one: one[0] / one[1], default=None)
+            count = int(np.sum(own_distances <= room))
+            distance = float(distances[count - 1]) if count <= len(distances) else 1.0
+            if distance > 2 * room and time + 2 * room * throw.duration < times[-1]:
+                misses.append((distance, 2 * room, float(time)))
+    return max(misses, key=lambda miss: miss[0] / miss[1], default=None)
 
 
-Judging = Generator[Sequence[Ask], Sequence[Answer], list[Judged]]
-Asking = Generator[Sequence[Ask], Sequence[Answer], str]
+ComparisonsGenerator = Generator[Sequence[Ask], Sequence[Answer], list[Comparison]]
+TextGenerator = Generator[Sequence[Ask], Sequence[Answer], str]
 
 
-def judging(
+def comparing(
     traits: Traits,
     throws: Sequence[Knobs],
     seed: int,
     equation: str,
     unrefined: float,
     all_levels: Sequence[Sequence[float]] = LEVELS,
-) -> Judging:
-    """Ask for throws, at three levels if the solver can be refined and at finer ones if need be, and judge each.
+) -> ComparisonsGenerator:
+    """Ask for throws, at three levels if the solver can be refined and at finer ones if needed, and compare each.
 
-    Ice has an answer without an error of the step: one level is enough.
+    For ice the step makes no error: one level is enough.
     """
-    asks, judged = [knobs.ask(seed) for knobs in throws], {}
-    left = list(range(len(asks)))
+    asks, comparisons = [knobs.ask(seed) for knobs in throws], {}
+    remaining = list(range(len(asks)))
     for levels in all_levels if traits.refined_by else ((0,),):
-        refined = {
+        asks_by_throw = {
             k: [
                 replace(asks[k], effort=effort_of(traits, asks[k].scenario, level))
                 for level in (levels[:1] if throws[k].frozen else levels)
             ]
-            for k in left
+            for k in remaining
         }
         with suppress(ForeignError):
-            # All at once, where somebody writes the answers.
-            yield [ask for series in refined.values() for ask in series]
-        for k, series in refined.items():
+            # All at once, in case somebody writes the answers by hand.
+            yield [ask for series in asks_by_throw.values() for ask in series]
+        for k, series in asks_by_throw.items():
             try:
-                judged[k] = judge(traits, asks[k], (yield series), equation, 0.0 if throws[k].frozen else unrefined)
+                comparisons[k] = compare(
+                    traits, asks[k], (yield series), equation, 0.0 if throws[k].frozen else unrefined
+                )
             except ForeignError as error:
-                judged[k] = Judged(wrong={"answer": (1.0, 1e-3, 0.0)}, error=str(error))
+                comparisons[k] = Comparison(wrong={"answer": (1.0, 1e-3, 0.0)}, error=str(error))
         # What fails at long steps need not fail at short ones.
-        left = [
-            k for k in left if judged[k].error or OWN * judged[k].own > FLOOR or (throws[k].frozen and judged[k].wrong)
+        remaining = [
+            k
+            for k in remaining
+            if comparisons[k].error
+            or OWN * comparisons[k].own_error > FLOOR
+            or (throws[k].frozen and comparisons[k].wrong)
         ]
-    return [judged[k] for k in range(len(asks))]
+    return [comparisons[k] for k in range(len(asks))]
 
 
 def confirmed(
-    traits: Traits, knobs: Knobs, judged: Judged, seed: int, equation: str, unrefined: float
-) -> Generator[Sequence[Ask], Sequence[Answer], Judged]:
-    """Return the judgement of a throw that is wrong at the finest levels, too.
+    traits: Traits, knobs: Knobs, comparison: Comparison, seed: int, equation: str, unrefined: float
+) -> Generator[Sequence[Ask], Sequence[Answer], Comparison]:
+    """Return the comparison of a wrong throw at the finest levels.
 
     A step that something else limits, such as an output time or a longest step, is the same at all coarse levels: its
     error does not show there as a change.
     """
-    if traits.refined_by is None or knobs.frozen or judged.error:
-        return judged
-    (judged,) = yield from judging(traits, [knobs], seed, equation, unrefined, LEVELS[-1:])
-    return judged
+    if traits.refined_by is None or knobs.frozen or comparison.error:
+        return comparison
+    (comparison,) = yield from comparing(traits, [knobs], seed, equation, unrefined, LEVELS[-1:])
+    return comparison
 
 
-def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
+def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
     """Other bottles, fillings, slices, starts, spins and times: every field is that of the equation."""
     place = yield from placing(traits)
     equation = traits.equation or place.equation
     if not place.on_lattice or place.equation != name_of(switches_of(equation)):
         raise NotApplicableError("needs an equation that the solver is found to solve")
-    unrefined = min(0.01 + 4 * place.distance, 0.018)  # as far off as where it was placed, and not blurred
+    unrefined = min(0.01 + 4 * place.distance, 0.018)  # as far off as on the throws that place it, below blurring
     throws = (*drawn(seed), SMALL, SLOW)
-    flights = list(zip(throws, (yield from judging(traits, throws, seed, equation, unrefined)), strict=True))
-    # Where a solver of low order errs less than elsewhere by luck, it owes no more than elsewhere.
-    usual = (
-        float(np.median([judged.own for knobs, judged in flights if not knobs.frozen])) if traits.refined_by else 0.0
+    flights = list(zip(throws, (yield from comparing(traits, throws, seed, equation, unrefined)), strict=True))
+    # Where a solver of low order errs less by luck, it is held to no more than its typical error.
+    typical_error = (
+        float(np.median([comparison.own_error for knobs, comparison in flights if not knobs.frozen]))
+        if traits.refined_by
+        else 0.0
     )
-    wrong = [(knobs, judged) for knobs, judged in flights if judged.farthest > (0.0 if knobs.frozen else usual)]
+    wrong = [
+        (knobs, comparison)
+        for knobs, comparison in flights
+        if comparison.largest_wrong > (0.0 if knobs.frozen else typical_error)
+    ]
     wrong = [flight for flight in wrong if not flight[0].frozen] or wrong
     wrong.sort(key=lambda flight: -flight[1].excess)
     while wrong:
@@ -562,89 +581,104 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> Making:
         if finest.wrong:
             break
         wrong = wrong[1:]
-    own = max((judged.own for _, judged in flights if not judged.error), default=0.0)
+    own_error = max((comparison.own_error for _, comparison in flights if not comparison.error), default=0.0)
     facts = {
         "seed": seed,
         "elsewhere": [
-            {"own": judged.own, "largest": judged.largest, "judged": judged.share, "wrong": sorted(judged.wrong)}
-            for _, judged in flights
+            {
+                "own": comparison.own_error,
+                "largest": comparison.largest,
+                "judged": comparison.share,
+                "wrong": sorted(comparison.wrong),
+            }
+            for _, comparison in flights
         ],
     }
     expected = f"{equation} in every field, on {len(flights)} throws of seed {seed}"
-    (full,) = yield from judging(traits, [FULL], seed, equation, unrefined)
+    (full,) = yield from comparing(traits, [FULL], seed, equation, unrefined)
     in_turn = bool(full.wrong) and not full.error and switches_of(equation).recoil
     if full.wrong and not in_turn and not wrong:
         wrong = [(FULL, full)]
     if not wrong:
-        largest = max(judged.largest for _, judged in flights)
-        blurred = sum(judged.share < 0.3 for _, judged in flights)
-        weak = own > WEAK or blurred > len(flights) // 2
-        words = f"its own error, {own:.2g} of omega_0, hides mistakes smaller than {OWN * own:.2g}" if weak else ""
+        largest = max(comparison.largest for _, comparison in flights)
+        blurred = sum(comparison.share < 0.3 for _, comparison in flights)
+        weak = own_error > WEAK or blurred > len(flights) // 2
+        weak_text = (
+            f"its own error, {own_error:.2g} of omega_0, hides mistakes smaller than {OWN * own_error:.2g}"
+            if weak
+            else ""
+        )
         if in_turn:
-            words = f"a full bottle with hits on both ends at one instant: {_wrong_words(full)}; in turn, not together?"
-        came = f"at most {largest:.2g} of omega_0 off, its own error {own:.2g}"
-        return Found(holds=True, expected=expected, came=came, weak=words, facts=facts)
-    came, advice = yield from bisected(traits, *wrong[0], seed, equation, unrefined)
+            weak_text = (
+                f"a full bottle with hits on both ends at one instant: {_wrong_text(full)}; in turn, not together?"
+            )
+        observed = f"at most {largest:.2g} of omega_0 off, its own error {own_error:.2g}"
+        return Observation(holds=True, expected=expected, observed=observed, weak=weak_text, facts=facts)
+    observed, advice = yield from bisected(traits, *wrong[0], seed, equation, unrefined)
     if not (wrong[0][0].frozen or wrong[0][1].error):
         with suppress(ForeignError, NotApplicableError):
-            pieces, what = yield from departing(traits, equation, [wrong[0][0].ask(seed)])
-            advice = f"{pieces and f'there it departs {pieces}; '}{what and f'{what}; '}{advice}"
+            departure, cause = yield from departing(traits, equation, [wrong[0][0].ask(seed)])
+            advice = f"{departure and f'there it departs {departure}; '}{cause and f'{cause}; '}{advice}"
     where = f"{len(wrong)} of {len(flights)} throws"
-    return Found(holds=False, expected=expected, came=came, where=where, advice=advice, facts=facts)
+    return Observation(holds=False, expected=expected, observed=observed, where=where, advice=advice, facts=facts)
 
 
 def bisected(
-    traits: Traits, knobs: Knobs, judged: Judged, seed: int, equation: str, unrefined: float
+    traits: Traits, knobs: Knobs, comparison: Comparison, seed: int, equation: str, unrefined: float
 ) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]:
-    """Return the sentence that tells right from wrong by one knob, and what to look at."""
-    how: Callable[[Sequence[Knobs]], Judging] = lambda all: judging(traits, all, seed, equation, unrefined)  # noqa: E731
+    """Return a sentence that separates right from wrong by one knob, and what to look at."""
+    compare_all: Callable[[Sequence[Knobs]], ComparisonsGenerator] = lambda throws: comparing(  # noqa: E731
+        traits, throws, seed, equation, unrefined
+    )
     if knobs in SIMILAR:
-        similar, words, units = SIMILAR[knobs]
-        (scaled,) = yield from how([similar])
+        similar, text, units = SIMILAR[knobs]
+        (scaled,) = yield from compare_all([similar])
         if not scaled.wrong:
             advice = f"the equation has no scale of its own: look for a constant in {units}"
-            return f"{words}: {_wrong_words(judged)}", advice
-    lost, together = _wrong_words(judged), TOGETHER if knobs is FULL else ""
+            return f"{text}: {_wrong_text(comparison)}", advice
+    wrong_text, together = _wrong_text(comparison), TOGETHER if knobs is FULL else ""
     names = [name for name in WORDS if getattr(knobs, name) != getattr(PAPER, name)]
     paper, ice = replace(PAPER, frozen=knobs.frozen), "in ice " if knobs.frozen else ""
-    (base,) = yield from how([paper])
+    (base,) = yield from compare_all([paper])
     if base.wrong:
         fields = _field_advice(base, ice=knobs.frozen)
-        without = "" if knobs.frozen or fields else (yield from simplified(traits, equation, unrefined))
-        return f"{ice}{_wrong_words(base)} on the paper's throw, too", f"{without}{fields}"
+        simpler_advice = (
+            "" if knobs.frozen or fields else (yield from simpler_throws_advice(traits, equation, unrefined))
+        )
+        return f"{ice}{_wrong_text(base)} on the paper's throw, too", f"{simpler_advice}{fields}"
     single = [_shortened(replace(paper, **{name: getattr(knobs, name)}), seed, FEW_IMPACTS) for name in names]
-    turned = sorted(zip(names, single, (yield from how(single)), strict=True), key=lambda trial: -trial[2].excess)
-    for name, throw, first in turned:
-        alone = (yield from confirmed(traits, throw, first, seed, equation, unrefined)) if first.wrong else first
-        if alone.wrong:
+    trials = sorted(zip(names, single, (yield from compare_all(single)), strict=True), key=lambda row: -row[2].excess)
+    for name, throw, trial in trials:
+        result = (yield from confirmed(traits, throw, trial, seed, equation, unrefined)) if trial.wrong else trial
+        if result.wrong:
             return (
-                f"{ice}right at {said(PAPER, name)}, wrong at {said(knobs, name)}: {_wrong_words(alone)}",
-                (together or _impact_advice(alone)) + (_field_advice(alone, ice=knobs.frozen) or WORDS[name][1]),
+                f"{ice}right at {knob_text(PAPER, name)}, wrong at {knob_text(knobs, name)}: {_wrong_text(result)}",
+                (together or _impact_advice(result)) + (_field_advice(result, ice=knobs.frozen) or WORDS[name][1]),
             )
-    backs = yield from how([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
-    again = [name for name, back in zip(names, backs, strict=True) if not back.wrong and back.share > 0.3]
-    if 0 < len(again) <= 4:
+    reverted = yield from compare_all([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
+    decisive = [name for name, result in zip(names, reverted, strict=True) if not result.wrong and result.share > 0.3]
+    if 0 < len(decisive) <= 4:
         paper_words, throw_words = (
-            " or ".join(said(PAPER, name) for name in again),
-            " and ".join(said(knobs, name) for name in again),
+            " or ".join(knob_text(PAPER, name) for name in decisive),
+            " and ".join(knob_text(knobs, name) for name in decisive),
         )
         return (
-            f"{ice}right at {paper_words}, wrong at {throw_words} where other things are changed, too: {lost}",
-            f"{together or _impact_advice(judged)}{'; or '.join(WORDS[name][1] for name in again)}"
-            f"{_field_advice(judged, '; ', ice=knobs.frozen)}",
+            f"{ice}right at {paper_words}, wrong at {throw_words} where other things are changed, too: {wrong_text}",
+            f"{together or _impact_advice(comparison)}{'; or '.join(WORDS[name][1] for name in decisive)}"
+            f"{_field_advice(comparison, '; ', ice=knobs.frozen)}",
         )
     return (
-        f"{ice}{lost} where {', '.join(said(knobs, name) for name in names)}",
-        f"{together or _impact_advice(judged)}{_field_advice(judged, ice=knobs.frozen)}",
+        f"{ice}{wrong_text} where {', '.join(knob_text(knobs, name) for name in names)}",
+        f"{together or _impact_advice(comparison)}{_field_advice(comparison, ice=knobs.frozen)}",
     )
 
 
-def on_the_paper(traits: Traits, equation: str) -> Asking:
-    """Return what is wrong on a throw with drag and impacts on both ends, beyond the solver's own error; or nothing."""
-    (judged,) = yield from judging(traits, [WHOLE], 0, equation, UNREFINED)
-    if judged.wrong:
-        judged = yield from confirmed(traits, WHOLE, judged, 0, equation, UNREFINED)
-    return _wrong_words(judged) if "omega" in judged.wrong else ""
+def wrong_on_whole(traits: Traits, equation: str) -> TextGenerator:
+    """Return what is wrong on a throw with drag and impacts on both ends, beyond the solver's own error; or empty."""
+    (comparison,) = yield from comparing(traits, [WHOLE], 0, equation, UNREFINED)
+    if comparison.wrong:
+        comparison = yield from confirmed(traits, WHOLE, comparison, 0, equation, UNREFINED)
+    return _wrong_text(comparison) if "omega" in comparison.wrong else ""
 
 
 LOOK_AT: Final[Mapping[str, str]] = {
@@ -653,7 +687,7 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "impacts": "impacts: restitution, recoil, their places, which slices take part",
     "rests": "rests: when a slice begins to rest on base or cap, when it is let go, and its part in what others do",
 }
-"""What to look at if an answer is right without weight, drag, impacts or rests, in the order in which this is asked."""
+"""What to look at if an answer is right without weight, drag, impacts or rests, in the order they are tested."""
 
 
 def right_without(name: str) -> str:
@@ -665,14 +699,14 @@ RESTLESS: Final = replace(WHOLE, start="scattered", restitution=1.0, damping=0.0
 """A throw with weight and impacts on both ends in which no slice ever rests."""
 
 STICKY: Final = replace(WHOLE, restitution=0.05, omega0=8.0)
-"""One in which slices rest on either end, and weight lets them go."""
+"""A throw in which slices rest on either end, and weight releases them."""
 
 
-def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> Asking:
-    """Return without what a throw is right, if anything tells: weight, drag, impacts, rests; and what to look at."""
+def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNREFINED) -> TextGenerator:
+    """Return which of weight, drag, impacts or rests must be left out to be right, if any, and what to look at."""
     for whole in (WHOLE, STICKY):
-        (first,) = yield from judging(traits, [whole], 0, equation, unrefined)
-        if first.wrong:
+        (full,) = yield from comparing(traits, [whole], 0, equation, unrefined)
+        if full.wrong:
             break
     else:
         return ""
@@ -683,13 +717,13 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
         "rests": RESTLESS,
         "all": replace(whole, gravity=0.0, damping=0.0, angle=1.0),
     }
-    others = yield from judging(traits, list(simpler.values()), 0, equation, unrefined)
-    right = {name for name, judged in zip(simpler, others, strict=True) if not judged.wrong}
-    onset = f"with all of it first wrong {first.since}; "
+    comparisons = yield from comparing(traits, list(simpler.values()), 0, equation, unrefined)
+    right = {name for name, comparison in zip(simpler, comparisons, strict=True) if not comparison.wrong}
+    onset = f"with all of it first wrong {full.onset}; "
     if {"weight", "impacts"} <= right:
         if "rests" in right:
             return f"right without weight, and without rests: look at {LOOK_AT['rests']}; {onset}"
-        if first.passed:
+        if full.impacts_passed:
             return f"right without weight, and through some impacts: look at rests and at {LOOK_AT['impacts']}; {onset}"
         return f"right without weight, and before half a turn: look at {LOOK_AT['weight']}, at every angle; {onset}"
     if {"rests", "impacts"} <= right:
@@ -699,49 +733,55 @@ def simplified(traits: Traits, equation: str, unrefined: float = UNREFINED) -> A
             return f"{right_without(name)}{onset}"
     if "all" in right:
         return f"right without weight, drag and impacts together, but wrong if only one of them is removed; {onset}"
-    too = "wrong before the first impact without weight and drag, too"
-    (apart,) = yield from judging(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
-    if not apart.wrong:
-        return f"{too}, but right with every slice far from the ends: look at the places of the ends, and at rests; "
-    return f"{too}: look at the centrifugal term omega^2 (r - r_cm), the inertia and the masses; "
+    text = "wrong before the first impact without weight and drag, too"
+    (centred,) = yield from comparing(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
+    if not centred.wrong:
+        return f"{text}, but right with every slice far from the ends: look at the places of the ends, and at rests; "
+    return f"{text}: look at the centrifugal term omega^2 (r - r_cm), the inertia and the masses; "
 
 
-def _wrong_words(judged: Judged) -> str:
+def _wrong_text(comparison: Comparison) -> str:
     """Return what is wrong, the worst first."""
-    if judged.error:
-        return f"no answer ({judged.error})"
-    worst = sorted(judged.wrong, key=lambda name: judged.wrong[name][0] / judged.wrong[name][1], reverse=True)
-    off, room, time = judged.wrong[worst[0]]
+    if comparison.error:
+        return f"no answer ({comparison.error})"
+    worst = sorted(
+        comparison.wrong, key=lambda name: comparison.wrong[name][0] / comparison.wrong[name][1], reverse=True
+    )
+    error, room, time = comparison.wrong[worst[0]]
     units = {"omega": "omega_0", "theta": "the angle turned", "inertia": "the largest J", "v": "L omega_0"}
     unit = {**units, "impacts": "the flight"}.get(worst[0], "L")
-    also = f", and {', '.join(worst[1:])}" if len(worst) > 1 else ""
-    is_off = f"{'are' if worst[0] == 'impacts' else 'is'} {off:.2g} of {unit} off (room {room:.1g})"
-    onset = f", first {judged.since}" if judged.since else ""
-    return f"{worst[0]} {is_off} at t = {time:.3g} s{also}{onset}"
+    further = f", and {', '.join(worst[1:])}" if len(worst) > 1 else ""
+    error_text = f"{'are' if worst[0] == 'impacts' else 'is'} {error:.2g} of {unit} off (room {room:.1g})"
+    onset = f", first {comparison.onset}" if comparison.onset else ""
+    return f"{worst[0]} {error_text} at t = {time:.3g} s{further}{onset}"
 
 
 TOGETHER: Final = "slices strike both ends at one instant there: each keeps its own speed times -e, none is left out; "
 """What to look at where ``FULL`` alone is wrong."""
 
 
-def _impact_advice(judged: Judged) -> str:
-    """Return that impacts come first, where an answer is right through some of them and wrong later."""
-    if AT_ONCE in judged.since:
+def _impact_advice(comparison: Comparison) -> str:
+    """Return that impacts are the first suspect, if an answer is right through some of them and wrong later."""
+    if AT_ONCE in comparison.onset:
         return "several slices strike at one instant there, and each keeps its own speed times -e; "
-    late = judged.passed and not _field_advice(judged)
+    after_impacts = comparison.impacts_passed and not _field_advice(comparison)
     return (
         "right through some impacts: look first at impacts, their number and order (of several in a step the earliest "
         "comes first), and at rests and their ends; "
-        if late
+        if after_impacts
         else ""
     )
 
 
-def _field_advice(judged: Judged, before: str = "", *, ice: bool = False) -> str:
-    """Return what to look at by the fields that are wrong, if omega is right: through impacts not by a small error."""
-    if ice and set(judged.wrong) == {"v"}:
-        return f"{before}what is frozen does not move in the bottle: its v is 0 and stays 0"
-    if judged.error or "omega" in judged.wrong or (judged.passed and judged.farthest < FAINT / 4):
+def _field_advice(comparison: Comparison, prefix: str = "", *, ice: bool = False) -> str:
+    """Return what to look at by the wrong fields, if omega is right; not for a small error after impacts."""
+    if ice and set(comparison.wrong) == {"v"}:
+        return f"{prefix}what is frozen does not move in the bottle: its v is 0 and stays 0"
+    if (
+        comparison.error
+        or "omega" in comparison.wrong
+        or (comparison.impacts_passed and comparison.largest_wrong < FAINT / 4)
+    ):
         return ""
-    only = ", ".join(judged.wrong)
-    return f"{before}omega is right, {only} not: look at how the answer is put together"
+    fields = ", ".join(comparison.wrong)
+    return f"{prefix}omega is right, {fields} not: look at how the answer is put together"

@@ -1,4 +1,4 @@
-"""What lies between two outputs of a solver, and what its equation makes of the state at the first one."""
+"""The interval between two outputs of a solver, and where its equation leads from the state at the first one."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from slicemodel.trajectory import BASE, CAP, FloatArray
 FIELDS: Final = ("theta", "omega", "r", "v")
 
 FLOOR: Final = 3e-6
-"""Departure between two outputs, a fraction of the field's scale, that counts for none."""
+"""Departure between two outputs, as a fraction of the field's scale, that is ignored."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interval:
-    """What lies between two outputs of a solver, [begin, end] in each array, and where it departs.
+    """The interval between two outputs of a solver, [begin, end] in each array, and where it departs.
 
     Parameters
     ----------
-    number, time : int, float - of the throw, and when the interval begins [s]
+    number, time : int, float - number of the throw, and when the interval begins [s]
     throw : Started - the throw from the solver's state at its first output
     theta, omega, r, v : arrays, shapes (2,), (2,), (2, N), (2, N) - what the solver answers; SI units
-    due : mapping - by field what the equation gives at the second output
+    expected : mapping - by field what the equation gives at the second output
     hits : tuple of (slice, end, time) - impacts in the equation
     before, after : array, shape (N,) - end on which each slice rests at either output in the equation, or 0
     departure : mapping
-        By field the largest difference from ``due``, a fraction of its scale; of omega that from what the solver's own
-        places make of the angular momentum.
-    faint : float - departure of v that a rest speed of another size may make
+        By field the largest difference from ``expected``, a fraction of its scale; for omega, from what the angular
+        momentum gives with the solver's own places.
+    faint : float - departure of v that another rest speed may cause
     """
 
     number: int
@@ -47,7 +47,7 @@ class Interval:
     omega: FloatArray
     r: FloatArray
     v: FloatArray
-    due: Mapping[str, FloatArray]
+    expected: Mapping[str, FloatArray]
     hits: tuple[tuple[int, int, float], ...]
     before: FloatArray
     after: FloatArray
@@ -73,7 +73,7 @@ class Interval:
     def strikes_beside(self, end: int, resting: int) -> bool:
         """Return whether a slice strikes an end while others rest on ``resting``."""
         others = np.flatnonzero(self.before == resting).tolist()
-        return any(side == end and set(others) - {who} for who, side, _ in self.hits)
+        return any(side == end and set(others) - {index} for index, side, _ in self.hits)
 
     def rests(self, end: int) -> bool:
         """Return whether a slice rests on an end at both outputs."""
@@ -88,7 +88,7 @@ class Interval:
         return bool(np.any((self.before == end) & (self.after != end)))
 
 
-def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Interval]:
+def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[Interval]:
     """Carry on from the state at each output to the next."""
     throw, switches = ask.scenario, switches_of(equation)
     length, spin = throw.bottle.length, abs(throw.omega0)
@@ -108,14 +108,16 @@ def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Int
             state = begun(throw, places, theta0=theta, omega0=omega, duration=span)
             flight = ode_reference.solve(state, switches, [0.0, span], speeds=v[0])
         except ValueError:
-            break  # a state that is no throw: the answer has gone astray long before
+            break  # a state that is no throw: the answer went wrong long before
         if len(flight.t) < 2 or flight.impacts is None:
             break
-        due = {name: getattr(flight, name)[-1] for name in FIELDS}
+        expected = {name: getattr(flight, name)[-1] for name in FIELDS}
         inertia = moment_of_inertia(throw, np.array([places, r[1]]))
-        due["omega"] = answer.omega[k] * inertia[0] / inertia[1]
-        scale["theta"] = max(1.0, abs(float(answer.theta[k + 1])))  # digits are those of a number, not of a radian
-        difference = {name: np.max(np.abs(getattr(answer, name)[k + 1] - due[name])) / scale[name] for name in FIELDS}
+        expected["omega"] = answer.omega[k] * inertia[0] / inertia[1]
+        scale["theta"] = max(1.0, abs(float(answer.theta[k + 1])))  # digits are relative to the number, not to a radian
+        difference = {
+            name: np.max(np.abs(getattr(answer, name)[k + 1] - expected[name])) / scale[name] for name in FIELDS
+        }
         intervals.append(
             Interval(
                 number=number,
@@ -125,12 +127,12 @@ def carried_on(equation: str, number: int, ask: Ask, answer: Answer) -> list[Int
                 omega=answer.omega[rows],
                 r=r,
                 v=v,
-                due=due,
+                expected=expected,
                 hits=tuple(
                     zip(*(getattr(flight.impacts, name).tolist() for name in ("slice", "end", "time")), strict=True)
                 ),
                 before=_resting(throw, places, v[0], 2 * rest_speed),
-                after=_resting(throw, due["r"], due["v"], 0.0),
+                after=_resting(throw, expected["r"], expected["v"], 0.0),
                 departure={name: min(float(value), 1e3) for name, value in difference.items()},  # its square is finite
                 faint=3 * rest_speed / scale["v"],
             )

@@ -26,10 +26,10 @@ from flipproof.foreign.elsewhere import (
     SEED,
     STICKY,
     WHOLE,
+    comparing,
     confirmed,
     designed,
     drawn,
-    judging,
 )
 from flipproof.foreign.solving import opened
 from flipproof.frame.solvers import solve
@@ -187,7 +187,7 @@ def test_a_check_sees_the_mistake_it_is_there_for(check, mistake):
     kind = {**MISTAKES, **{each.__name__: each for each in MINE}}[mistake]
     (result,) = certify(InProcess(kind(), mistake), [check]).results
     assert result.verdict == FAILED
-    assert result.found.advice in result.line
+    assert result.observation.advice in result.line
 
 
 def test_errors_that_do_not_fall_across_impacts_are_seen():
@@ -213,7 +213,7 @@ def test_rebounds_on_the_grid_are_seen_at_other_steps_and_slices(monkeypatch, sl
 
     (result,) = certify(InProcess(AtOtherSteps(), "grid"), ["order-across-impacts"]).results
     assert result.verdict == FAILED
-    assert result.found.facts["order_across_impacts"] < 0.4
+    assert result.observation.facts["order_across_impacts"] < 0.4
 
 
 def test_the_published_numbers_are_kept_by_whose_they_are():
@@ -228,8 +228,8 @@ def test_the_published_numbers_are_kept_by_whose_they_are():
 def test_a_threshold_is_named():
     (result,) = certify(InProcess(MISTAKES["VelocityThreshold"](), "dead"), ["restitution"]).results
     assert result.verdict == FAILED
-    assert "a velocity threshold" in result.found.came
-    low, high = result.found.facts["threshold"]
+    assert "a velocity threshold" in result.observation.observed
+    low, high = result.observation.facts["threshold"]
     assert low <= 0.5 <= high
     assert high - low < 0.05
 
@@ -253,20 +253,20 @@ def test_float32_is_named_by_its_numbers_and_allowed_if_declared():
     single = MISTAKES["SinglePrecision"]
     result = result_of("digits", single)
     assert result.verdict == FAILED
-    assert "the numbers of theta, r, v are those of float32" in result.found.came
-    assert result.found.facts["arithmetic"] == "float32"
+    assert "the numbers of theta, r, v are those of float32" in result.observation.observed
+    assert result.observation.facts["arithmetic"] == "float32"
     assert result_of("digits", single, precision="float32").verdict == PASSED
     assert result_of("precision-floor", single, precision="float32").verdict == PASSED
 
 
 def test_a_floor_is_found_within_two_levels_where_noise_passes_for_a_falling_error():
-    facts = result_of("precision-floor", SingleEuler).found.facts
+    facts = result_of("precision-floor", SingleEuler).observation.facts
     assert len(facts["changes"]) == 2
     # By the changes alone it still falls; steps shorter by a sixteenth say that it does not.
     assert facts["changes"][1] < checks_measured.STILL * facts["changes"][0]
     assert facts["noises"][0] > checks_measured.NOISE * facts["changes"][1]
     (result,) = certify(opened("exact-step"), ["precision-floor"]).results  # of order 1, too, in float64
-    facts = result.found.facts
+    facts = result.observation.facts
     assert not facts["floor_reached"]
     assert all(
         0.0 < noise < 0.1 * change for noise, change in zip(facts["noises"], facts["changes"][1:-1], strict=True)
@@ -294,7 +294,7 @@ def test_a_tolerance_inside_that_no_step_refines_is_a_weakness_with_its_number()
     result = result_of("precision-floor", Loose)
     assert result.verdict == WEAK
     assert "refinement ends at" in result.line
-    assert 1e-7 < result.found.facts["floor"] < 1e-5
+    assert 1e-7 < result.observation.facts["floor"] < 1e-5
 
 
 @pytest.mark.parametrize(
@@ -324,7 +324,7 @@ def test_a_solver_too_slow_for_the_finest_steps_is_not_accused():
 
     result = result_of("precision-floor", Slow, order=1.0)
     assert result.verdict == PASSED
-    assert len(result.found.facts["changes"]) == 1
+    assert len(result.observation.facts["changes"]) == 1
 
 
 def test_slices_that_jump_have_no_speed_and_break_no_check():
@@ -342,13 +342,13 @@ def test_slices_that_jump_have_no_speed_and_break_no_check():
 
 def judged(kind, knobs):
     solver = InProcess(kind(), "x")
-    (found,) = drive(judging(solver.traits, [knobs], SEED, "free-flight", 0.01), solver)
+    (found,) = drive(comparing(solver.traits, [knobs], SEED, "free-flight", 0.01), solver)
     return solver, found
 
 
 def test_a_step_that_is_capped_hides_its_error_and_is_not_accused_of_it():
     solver, found = judged(CappedEuler, WHOLE)
-    assert found.own == 0.0  # all coarse levels take the same steps
+    assert found.own_error == 0.0  # all coarse levels take the same steps
     assert "omega" in found.wrong
     assert not drive(confirmed(solver.traits, WHOLE, found, SEED, "free-flight", 0.01), solver).wrong
     (result,) = certify(solver, ["equation"]).results
@@ -359,7 +359,7 @@ def test_hits_on_both_ends_at_one_instant_are_asked_for_and_accuse_nobody():
     _, in_turn = judged(Subject, FULL)  # rounding parts the two hits
     assert in_turn.wrong["omega"][0] > 0.1
     solver = InProcess(patches("right")["free_flight_rk4"].solver(), "x")
-    (together,) = drive(judging(solver.traits, [FULL], SEED, "free-flight", 0.01), solver)
+    (together,) = drive(comparing(solver.traits, [FULL], SEED, "free-flight", 0.01), solver)
     assert not together.wrong
 
 
@@ -517,7 +517,7 @@ def test_a_small_drift_of_angular_momentum_that_no_step_mends_is_a_weakness(drif
 def test_an_equation_can_be_asked_for_and_what_spoils_it_is_named():
     (result,) = certify(InProcess(Subject(), "x"), ["equation"], equation="eq8").results
     assert result.verdict == FAILED
-    assert result.found.expected == "eq8"
+    assert result.observation.expected == "eq8"
     (result,) = certify(InProcess(MISTAKES["Weight"](), "x"), ["equation"]).results
     assert "right without weight" in result.line
 

@@ -132,7 +132,7 @@ def test_the_papers_matlab_program_prints_its_numbers_in_octave(tmp_path):
         found = certify(runner, ["ice", "restitution", "published-vectors"], equation="published-matlab")
     ice, restitution, vectors = found.results
     assert [ice.verdict, vectors.verdict] == [PASSED, PASSED]
-    assert vectors.found.facts["vectors"] < 1e-10
+    assert vectors.observation.facts["vectors"] < 1e-10
     assert restitution.verdict == FAILED  # slices that have passed an end stay outside
     folder = Folder(tmp_path / "answers", {"equation": "published-matlab", "refined_by": "dt", "order": 1.0})
     certify(folder, ["ice"])

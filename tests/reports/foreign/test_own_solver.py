@@ -139,12 +139,12 @@ def test_box2d_has_a_threshold_at_1_m_s_and_a_float32_floor():
     names = ["restitution", "digits", "precision-floor"]
     found = {name: certify(InProcess(load(f"{BOX2D / 'flipproof_box2d.py'}:{name}"), name), names).results
              for name in ("Box2D", "Box2DSI")}  # fmt: skip
-    low, high = found["Box2DSI"][0].found.facts["threshold"]
+    low, high = found["Box2DSI"][0].observation.facts["threshold"]
     assert 0.95 <= low <= high <= 1.05
-    assert all(abs(e - 0.5) <= 5e-3 for _, _, e in found["Box2D"][0].found.facts["restitution"])
+    assert all(abs(e - 0.5) <= 5e-3 for _, _, e in found["Box2D"][0].observation.facts["restitution"])
     for _, digits, floor in found.values():
-        assert digits.found.facts["arithmetic"] == "float32"
-        assert len(floor.found.facts["changes"]) <= 2
+        assert digits.observation.facts["arithmetic"] == "float32"
+        assert len(floor.observation.facts["changes"]) <= 2
 
 
 @pytest.mark.usefixtures("folder")

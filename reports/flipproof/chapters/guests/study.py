@@ -147,7 +147,9 @@ def placed_on(
 def place_in(certificate: Certificate | None) -> Mapping[str, Any] | None:
     """Return where a certificate places a solver among the equations, if it does."""
     results = () if certificate is None else certificate.results
-    places = [r.found.facts["place"] for r in results if r.found is not None and "place" in r.found.facts]
+    places = [
+        r.observation.facts["place"] for r in results if r.observation is not None and "place" in r.observation.facts
+    ]
     return places[0] if places else None
 
 
