@@ -1,4 +1,4 @@
-"""A certificate as a small drawing, such as stands in a README: equation, verdict, and for which throws it is true."""
+"""A certificate as a small badge for a README: equation, verdict, and the throws for which it holds."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ BADGE = """<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="20" r
 
 
 def badge(certificate: Certificate) -> str:
-    """Return the drawing as SVG; its title is the conclusion, with the whole domain."""
+    """Return the badge as SVG; its title is the conclusion, with the whole domain."""
     weak = sum(result.verdict == WEAK for result in certificate.results)
     verdict = f"{len(certificate.failed)} failed" if certificate.failed else f"{weak} weak" if weak else "passed"
     domain = {name: certificate.domain[name] for name in ("slices", "restitution") if name in certificate.domain}
-    words = f"{certificate.traits.equation or 'no equation'}: {verdict}"
-    words += f" ({domain_text(domain)})" if domain else ""
+    text = f"{certificate.traits.equation or 'no equation'}: {verdict}"
+    text += f" ({domain_text(domain)})" if domain else ""
     colour = "#a62b1f" if certificate.failed else "#8a6100" if weak else "#2b7a2b"
-    length = round(6.6 * len(words))
+    length = round(6.6 * len(text))
     title = escape(f"{certificate.traits.name}: {certificate.conclusion}")
     return BADGE.format(
-        width=length + 74, rest=length + 12, length=length, colour=colour, title=title, words=escape(words)
+        width=length + 74, rest=length + 12, length=length, colour=colour, title=title, words=escape(text)
     )

@@ -1,4 +1,4 @@
-"""The contract of a foreign solver: what it is asked, what it says of itself, and what it answers.
+"""The contract of a foreign solver: what it is asked, what it declares, and what it answers.
 
 def solve(ask):                                       # or an object with this method and the attributes of Traits
     t = ask.times                                     # answer at exactly these times
@@ -29,25 +29,25 @@ PRECISIONS: Final = MappingProxyType(
 """Number formats a solver may compute in or print, with the spacing of their numbers at 1."""
 
 REFINERS: Final = ("dt", "steps", "rtol")
-"""What the effort of a solver may be: a step [s], a number of steps, a relative tolerance."""
+"""Kinds of effort of a solver: a step [s], a number of steps, a relative tolerance."""
 
 
 MAX_NAME: Final = 100
-"""Most characters of a solver's name."""
+"""Longest name of a solver, in characters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
-    """What a solver is asked, many times in one process: nothing may be kept from one ask to the next.
+    """What a solver is asked, many times in one process: it must keep nothing from one ask to the next.
 
     Whatever ``Scenario`` admits may be asked: spin in either direction, any angle at release, one slice, gravity, drag
     or restitution of 0.
 
     Parameters
     ----------
-    scenario : Scenario - the throw; units stand in ``slicemodel.scenario``
+    scenario : Scenario - the throw; units as in ``slicemodel.scenario``
     times : array, shape (P,), P >= 1 - strictly increasing times in [0, duration] at which to answer [s]; the release
-        is t = 0, also where the first of them is later
+        is at t = 0, even if the first of them is later
     start : array, shape (N,) - positions of the slices at release, from the cap [m], in any order, not only those of
         ``scenario.initial_positions()``; the slices are at rest in the bottle
     effort : float or None - the number that ``Traits.refined_by`` names; None if it names nothing
@@ -81,7 +81,7 @@ class Started(Scenario):
 
 
 def started(ask: Ask) -> Scenario:
-    """Return the throw of an ask for flipproof's own solvers, which take the start from the throw."""
+    """Return the throw of an ask with its start, for flipproof's own solvers, which take the start from the throw."""
     throw = ask.scenario
     if np.array_equal(ask.start, throw.initial_positions()):
         return throw
@@ -150,7 +150,7 @@ class Traits:
 
 
 def check_equation(name: object) -> None:
-    """Refuse by a ValueError what is neither a model of the reference, nor a set of switches, nor a scheme."""
+    """Raise ValueError for what is neither a model of the reference, nor a set of switches, nor a scheme."""
     from ode_reference.models import MODELS
     from ode_reference.switches import Switches, are_switches
     from slicemodel.schemes import SCHEMES
@@ -162,29 +162,29 @@ def check_equation(name: object) -> None:
 
 
 def traits_of(solver: object, name: str) -> Traits:
-    """Return what ``solver`` says of itself, or raise ValueError; ``name`` serves where it has none."""
+    """Return the traits that ``solver`` declares, or raise ValueError; ``name`` is used if it has none."""
     solve_of(solver)
     given = {
         f: value
         for f in Traits.__slots__
         if f != "name" and (value := getattr(solver, f, None)) is not None and not callable(value)
     }
-    own = getattr(solver, "name", None)
+    own_name = getattr(solver, "name", None)
     spec = name if len(name) <= MAX_NAME else f"... {name[4 - MAX_NAME :]}"
-    return Traits(name=own if isinstance(own, str) else spec, **given)
+    return Traits(name=own_name if isinstance(own_name, str) else spec, **given)
 
 
 def solve_of(solver: object) -> Callable[[Ask], object]:
-    """Return the function of one ask that ``solver`` is, or has as ``solve``; raises ValueError if there is none."""
+    """Return ``solver.solve``, or ``solver`` itself if it has none; raises ValueError if that is not callable."""
     solve = getattr(solver, "solve", solver)
     if not callable(solve):
         raise ValueError(f"{shown(solver)} is neither callable nor has a method solve(ask)")
     return solve
 
 
-def _inside(value: object, above: float, most: float) -> bool:
-    number = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    return number and math.isfinite(float(value)) and above < float(value) <= most  # type: ignore[arg-type]
+def _inside(value: object, lower: float, upper: float) -> bool:
+    is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    return is_number and math.isfinite(float(value)) and lower < float(value) <= upper  # type: ignore[arg-type]
 
 
 # ---------------------------------------------------------------------- the answer
@@ -196,7 +196,7 @@ IMPACT: Final = tuple(name for name, _ in IMPACT_FIELDS)
 
 
 class AnswerError(ValueError):
-    """What a solver returned is no answer; the message names the field, what came and what is needed."""
+    """What a solver returned is no answer; the message names the field, what it holds and what is needed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -219,7 +219,7 @@ class Answer:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Names of the fields that there are."""
+        """Names of the fields that the solver gave."""
         return tuple(name for name in self.__slots__ if getattr(self, name) is not None)
 
 
@@ -227,8 +227,8 @@ def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
     """Return a mapping, a Trajectory or any object with the attributes of ``Answer`` as a checked answer.
 
     Times within 1e-6 of the duration of those asked, as a program prints them, are taken for those asked. With
-    ``own_times`` it was made before it was asked, as a file is: its times need only increase. Raises AnswerError,
-    naming the field, what came and what is needed.
+    ``own_times`` the answer is older than the ask, as a file is: its times need only increase. Raises AnswerError,
+    naming the field, what it holds and what is needed.
     """
     if isinstance(given, Trajectory) and not given.ok:
         raise AnswerError(f"status = {given.status!r}: {given.message}")
@@ -261,7 +261,7 @@ def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
 
 
 def _field(given: object, name: str) -> Any:
-    """Return what a mapping has under a name, or an object as an attribute; None if nothing."""
+    """Return the value of a mapping's key or an object's attribute; None if there is none."""
     return given.get(name) if isinstance(given, Mapping) else getattr(given, name, None)
 
 
@@ -276,26 +276,26 @@ def numbers_of(name: str, value: object, shape: tuple[int, ...]) -> FloatArray:
     if array.shape != shape:
         raise AnswerError(f"{name} has shape {array.shape}, not {shape}")
     if array.dtype.kind not in "fiu":
-        words = {"c": "complex numbers", "U": "text", "S": "text", "O": "objects", "b": "truth values"}
-        kind = words.get(array.dtype.kind, str(array.dtype))
+        kinds = {"c": "complex numbers", "U": "text", "S": "text", "O": "objects", "b": "truth values"}
+        kind = kinds.get(array.dtype.kind, str(array.dtype))
         raise AnswerError(f"{name} holds {kind}; real numbers are needed")
     masked = np.ma.getmaskarray(value) if isinstance(value, np.ma.MaskedArray) else np.zeros(shape, dtype=bool)
     if masked.any():
-        raise AnswerError(f"{name}{_first(masked)} is masked; a number is needed")
+        raise AnswerError(f"{name}{_first_index(masked)} is masked; a number is needed")
     array = np.ascontiguousarray(array, dtype=np.float64)
     if not np.isfinite(array).all():
         wrong = ~np.isfinite(array)
-        raise AnswerError(f"{name}{_first(wrong)} = {array[wrong][0]} is not finite")
+        raise AnswerError(f"{name}{_first_index(wrong)} = {array[wrong][0]} is not finite")
     return array
 
 
-def _first(wrong: NDArray[np.bool_]) -> str:
+def _first_index(wrong: NDArray[np.bool_]) -> str:
     """Return the index of the first True, in brackets."""
     return f"[{', '.join(str(k) for k in np.argwhere(wrong)[0])}]"
 
 
-def _length(name: str, value: object, needed: int | None = None) -> int:
-    """Return the length of a one-dimensional field, before anything of its size is copied."""
+def _length(name: str, value: object, expected: int | None = None) -> int:
+    """Return the length of a one-dimensional field, without copying it."""
     if isinstance(value, (str, bytes)):
         raise AnswerError(f"{name} = {shown(value)} is not an array of numbers")
     shape = getattr(value, "shape", None)
@@ -304,8 +304,8 @@ def _length(name: str, value: object, needed: int | None = None) -> int:
             shape = (len(value),)  # type: ignore[arg-type]
         except TypeError:
             raise AnswerError(f"{name} is a {type(value).__name__}, not an array of numbers") from None
-    if len(shape) != 1 or (needed is not None and shape[0] != needed):
-        raise AnswerError(f"{name} has shape {tuple(shape)}, not ({'P' if needed is None else needed},)")
+    if len(shape) != 1 or (expected is not None and shape[0] != expected):
+        raise AnswerError(f"{name} has shape {tuple(shape)}, not ({'P' if expected is None else expected},)")
     return int(shape[0])
 
 
@@ -330,7 +330,7 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
     broken = arrays["slice"] % 1.0 != 0.0
     if broken.any():
         raise AnswerError(
-            f"impacts.slice{_first(broken)} = {arrays['slice'][broken][0]:g} is not a whole number in "
+            f"impacts.slice{_first_index(broken)} = {arrays['slice'][broken][0]:g} is not a whole number in "
             f"[0, {n_slices - 1}]"
         )
     return Impacts(**arrays)  # type: ignore[arg-type]
@@ -339,8 +339,8 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
 def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Trajectory:
     """Return an answer as a Trajectory of method ``name``, for comparison with every other solver.
 
-    ``diagnostics["not_given"]`` names what the solver did not give: inertia is then what the conserved angular momentum
-    implies, J_0 omega_0 / omega, and r_cm what it was at release; neither is shown or compared.
+    ``diagnostics["not_given"]`` names what the solver did not give: inertia then follows from the conserved angular
+    momentum, J_0 omega_0 / omega, and r_cm keeps its value at release; neither is shown or compared.
     """
     r_cm, inertia = answer.r_cm, answer.inertia
     if r_cm is None:
@@ -365,19 +365,19 @@ def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Tr
     )
 
 
-# ---------------------------------------------------------------------- who answers
+# ---------------------------------------------------------------------- runners
 
 
 class ForeignError(ValueError):
-    """A foreign solver gave no answer; the message says in one line what happened."""
+    """A foreign solver gave no answer; the message says what happened, on one line."""
 
 
 class WaitingError(ForeignError):
-    """An answer that somebody is to write is not there yet."""
+    """An answer that somebody has to write does not exist yet."""
 
 
 class Runner:
-    """A solver that can be asked, wherever it runs; ``traits`` is what it says of itself."""
+    """A solver that can be asked, wherever it runs; ``traits`` is what it declares."""
 
     traits: Traits
 
@@ -386,4 +386,4 @@ class Runner:
         raise NotImplementedError
 
     def close(self) -> None:
-        """End what runs for it, if anything does."""
+        """End its process, if it has one."""

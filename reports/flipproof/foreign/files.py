@@ -1,4 +1,4 @@
-"""Solvers that answer by files: a curve that is there already, any program that reads and writes CSV, and a folder."""
+"""Solvers that answer by files: an existing curve, any program that reads and writes CSV, and a folder."""
 
 from __future__ import annotations
 
@@ -29,36 +29,36 @@ from flipproof.foreign.contract import (
     answer_of,
 )
 from flipproof.foreign.processes import KEPT, ending, last_line
-from flipproof.foreign.specs import words_of, written
+from flipproof.foreign.specs import split_spec, words_of
 from flipproof.output.files import write_whole
 from slicemodel.scenario import unknown_name
 
 
 def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
     """Read t, theta, omega and, if known, r_cm, inertia, r_0 ... and v_0 ... below a header, or raise AnswerError."""
-    most = 1 << 30
+    max_bytes = 1 << 30
     try:
-        if path.stat().st_size > most:
-            raise AnswerError(f"{path} is larger than {most} bytes")
+        if path.stat().st_size > max_bytes:
+            raise AnswerError(f"{path} is larger than {max_bytes} bytes")
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = csv.reader(file)
             header = [name.strip() for name in next(rows, [])]
             body = [(rows.line_num, row) for row in rows if row]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise AnswerError(f"{path} cannot be read ({error})") from None
-    if len(header) == 1 and (mark := next((m for m in (";", "\t") if m in header[0]), "")):
-        kind = "semicolons" if mark == ";" else "tabs"
+    if len(header) == 1 and (separator := next((m for m in (";", "\t") if m in header[0]), "")):
+        kind = "semicolons" if separator == ";" else "tabs"
         raise AnswerError(f"{path} separates its columns by {kind}; commas are needed, and points in numbers")
     if not header or not body:
         raise AnswerError(f"{path} has no {'rows' if header else 'header'}; columns t, theta, omega are needed")
     if len(set(header)) < len(header):
-        twice = next(name for name in header if header.count(name) > 1)
-        raise AnswerError(f"{path} names the column {twice!r} twice")
+        repeated = next(name for name in header if header.count(name) > 1)
+        raise AnswerError(f"{path} names the column {repeated!r} twice")
     cells: dict[str, list[float]] = {name: [] for name in header}
     for line, row in body:
         if len(row) != len(header):
-            why = "; a decimal comma? numbers need points" if len(row) == 2 * len(header) else ""
-            raise AnswerError(f"{path}: line {line} has {len(row)} cells, the header {len(header)}{why}")
+            hint = "; a decimal comma? numbers need points" if len(row) == 2 * len(header) else ""
+            raise AnswerError(f"{path}: line {line} has {len(row)} cells, the header {len(header)}{hint}")
         for name, cell in zip(header, row, strict=True):
             try:
                 cells[name].append(float(cell))
@@ -68,19 +68,19 @@ def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
     columns: dict[str, Any] = {name: np.array(values) for name, values in cells.items()}
     for name in PER_SLICE:
         needed = [f"{name}_{i}" for i in range(n_slices)]
-        there = [column for column in header if re.fullmatch(rf"{name}_\d+", column)]
-        if there and set(there) != set(needed):
+        given = [column for column in header if re.fullmatch(rf"{name}_\d+", column)]
+        if given and set(given) != set(needed):
             raise AnswerError(
-                f"{path} has {len(there)} columns from {there[0]} to {there[-1]}; a throw of {n_slices} slices needs "
+                f"{path} has {len(given)} columns from {given[0]} to {given[-1]}; a throw of {n_slices} slices needs "
                 f"{needed[0]} to {needed[-1]}, or none of them"
             )
-        if there:
+        if given:
             columns[name] = np.column_stack([columns[column] for column in needed])
     return columns
 
 
 def write_ask(ask: Ask, folder: Path) -> dict[str, str]:
-    """Write what a program is asked into a folder; return what stands on its command line for words in braces."""
+    """Write an ask as files into a folder; return what replaces the words in braces on a command line."""
     texts = {
         "scenario.toml": ask.scenario.to_toml(),
         "times.csv": "t\n" + "".join(f"{t!r}\n" for t in ask.times.tolist()),
@@ -102,10 +102,10 @@ def answer_in(path: Path, ask: Ask, name: str, *, own_times: bool = False) -> An
 
 
 class File(Runner):
-    """A curve in a CSV file. It answers at its own times, for whatever throw it is taken to be of."""
+    """A curve in a CSV file. It answers at its own times, whatever the throw."""
 
     def __init__(self, spec: str) -> None:
-        self.path = Path(written(spec)[1])
+        self.path = Path(split_spec(spec)[1])
         if not self.path.is_file():
             raise ValueError(f"solver {spec!r}: there is no file {self.path}")
         self.traits = Traits(name=self.path.name)
@@ -116,11 +116,11 @@ class File(Runner):
 
 
 PLACEHOLDERS: Final = ("scenario", "times", "start", "effort", "out")
-"""What a command may hold in braces: the files that it is to read, its effort, and the file that it is to write."""
+"""What a command may hold in braces: the files it reads, its effort, and the file it writes."""
 
 
 def traits_of_command(spec: str, timeout: float | None, given: Mapping[str, Any]) -> Traits:
-    """Return what is ``given`` of a program, which cannot say it itself; {effort} is a step unless that says otherwise.
+    """Return the traits ``given`` for a program, which cannot declare them; {effort} is a step unless these differ.
 
     Raises ValueError for a command without {out} or with other words in braces.
     """
@@ -142,26 +142,29 @@ def traits_of_command(spec: str, timeout: float | None, given: Mapping[str, Any]
 def run_command(spec: str, folder: str, ask: Ask) -> Answer:
     """Write scenario, times and start as files, call a program, and return the answer in the CSV that it wrote.
 
-    It runs in the process of the solver (``isolated.serve``), which is held to limits and ended with what it leaves;
-    ``folder`` holds the files and is removed then.
+    It runs in the process of the solver (``isolated.serve``), which has limits and is ended with all that it started;
+    ``folder`` holds the files and is then removed.
     """
     words = words_of(spec)
     with tempfile.TemporaryDirectory(dir=folder) as scratch, tempfile.TemporaryFile() as printed:
         values = write_ask(ask, Path(scratch))
-        given = words
+        arguments = words
         for name, value in values.items():
-            given = [word.replace(f"{{{name}}}", value) for word in given]
+            arguments = [word.replace(f"{{{name}}}", value) for word in arguments]
         null = subprocess.DEVNULL
         try:
             status = subprocess.call(
-                [word.replace("{{", "{").replace("}}", "}") for word in given], stdin=null, stdout=null, stderr=printed
+                [word.replace("{{", "{").replace("}}", "}") for word in arguments],
+                stdin=null,
+                stdout=null,
+                stderr=printed,
             )
         except OSError as error:
             raise ForeignError(f"{words[0]} cannot be started ({error.strerror or error})") from None
         if status:
             printed.seek(max(0, printed.seek(0, 2) - KEPT))
-            last = last_line(printed.read())
-            raise ForeignError(f"{words[0]} {ending(status)}{f': {last}' if last else ''}")
+            line = last_line(printed.read())
+            raise ForeignError(f"{words[0]} {ending(status)}{f': {line}' if line else ''}")
         out = Path(values["out"])
         if not out.is_file():
             raise ForeignError(f"{words[0]} ended without writing {{out}}")
@@ -172,8 +175,8 @@ class Folder(Runner):
     """Questions and answers as files, for a solver that cannot be called; a new question is added to them.
 
     ``FOLDER/0001-KEY/`` holds scenario.toml, scenario.json, times.csv, start.csv and effort.txt; the solver's author
-    puts answer.csv beside them. ``FOLDER/solver.json`` keeps what is ``given`` of the solver. Equal questions have
-    equal keys. Raises ValueError for a folder that holds something else.
+    puts answer.csv beside them. ``FOLDER/solver.json`` keeps the ``given`` traits. Equal questions have equal
+    keys. Raises ValueError for a folder that holds something else.
     """
 
     def __init__(self, folder: Path, given: Mapping[str, Any] = MappingProxyType({})) -> None:
@@ -187,28 +190,28 @@ class Folder(Runner):
         except (OSError, ValueError, TypeError, RecursionError) as error:
             raise ValueError(f"{index}: is not readable ({error})") from None
         if given or not index.is_file():
-            kept = {name: value for name, value in asdict(self.traits).items() if value not in (None, "", {})}
+            stored = {name: value for name, value in asdict(self.traits).items() if value not in (None, "", {})}
             try:
                 folder.mkdir(parents=True, exist_ok=True)
-                write_whole(index, (json.dumps(kept, indent=1) + "\n").encode())
+                write_whole(index, (json.dumps(stored, indent=1) + "\n").encode())
             except OSError as error:
                 raise ValueError(f"{folder} cannot be written ({error.strerror or error})") from None
 
     def __call__(self, ask: Ask) -> Answer:
-        """Return the answer beside a question; add the question if it is not there."""
+        """Return the answer beside a question; add the question if it is new."""
         text = json.dumps([ask.scenario.to_mapping(), ask.effort, dict(ask.options)], sort_keys=True).encode()
         key = hashlib.sha256(text + ask.times.tobytes() + ask.start.tobytes()).hexdigest()[:12]
-        place = next(iter(self.folder.glob(f"[0-9]*-{key}")), None)
-        if place is None:
-            place = self.folder / f"{len(list(self.folder.glob('[0-9]*-*'))) + 1:04d}-{key}"
+        question = next(iter(self.folder.glob(f"[0-9]*-{key}")), None)
+        if question is None:
+            question = self.folder / f"{len(list(self.folder.glob('[0-9]*-*'))) + 1:04d}-{key}"
             with tempfile.TemporaryDirectory(dir=self.folder, prefix=".new-") as new:  # whole or not at all
                 write_ask(ask, Path(new))
                 effort = "" if ask.effort is None else f"{ask.effort!r}\n"
                 throw = json.dumps(ask.scenario.to_mapping(), indent=1) + "\n"
                 (Path(new) / "scenario.json").write_text(throw, encoding="utf-8")
                 (Path(new) / "effort.txt").write_text(effort, encoding="utf-8")
-                shutil.copytree(new, place)
-        path = place / "answer.csv"
+                shutil.copytree(new, question)
+        path = question / "answer.csv"
         if not path.is_file():
             self.waiting.add(path)
             raise WaitingError(f"{path.relative_to(self.folder)} is not there yet")

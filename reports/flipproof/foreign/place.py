@@ -1,13 +1,13 @@
 """Which equation a solver solves, the nearest of the 64 of the ladder, and why two solvers differ.
 
-Three short throws are asked for, chosen so that all equations that differ at all differ by 0.029 of omega_0 or more in
-omega(t) on at least one of them; each is judged by what the solver's own answers still change there. Of the 64 sets of
-switches 40 are different equations: without signs nothing drags, and where the tube moves the drag acts on it, so that
-"drag_on_centre" has no effect there.
+Three short throws are asked for, chosen so that any two different equations differ by 0.029 of omega_0 or more in
+omega(t) on at least one of them; distances are compared with the change of the solver's answers under refinement. The
+64 sets of switches are 40 different equations: without signs nothing drags, and where the tube moves the drag acts on
+it, so that "drag_on_centre" has no effect.
 
 The difference of two solvers is split over the switches in which their equations differ: each switch gets the mean of
-what it changes over all orders of turning these switches (the Shapley value). What no switch explains is the rest: the
-solvers' own errors, and what is no choice of the ladder.
+what it changes over all orders of turning these switches (the Shapley value). The rest, which no switch explains, is
+the solvers' own errors, and differences outside the ladder.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ LEVELS: Final = ((-1, -2, -3), (1, 0, -1), (3, 2, 1))
 """Levels of refinement, finer ones where coarser ones are not ``SETTLED`` on an equation."""
 
 SETTLED: Final = 2e-5
-"""Change under refinement, fraction of omega_0, below which finer steps tell nothing more."""
+"""Change under refinement, fraction of omega_0, below which finer steps tell nothing new."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,12 +62,12 @@ class Place:
     ----------
     solver : str
     equation : str - the nearest equation, by its name on the ladder if it has one
-    switches : Switches - of it
-    distance : float - largest difference of omega(t) to it, fraction of omega_0, on the throw where it exceeds what
-        the solver's own change there explains most
+    switches : Switches - those of this equation
+    distance : float - largest difference of omega(t) from it, fraction of omega_0, on the throw where that most exceeds
+        what the solver's own change explains
     change : float or None - the same between two refinements of the solver; None if it cannot be refined
     room : float - distance that the solver's own error explains, fraction of omega_0
-    following : str, and following_distance : float - the next equation that is a different one
+    following : str, and following_distance : float - the next different equation
     inert : tuple of str - switches without effect in the nearest equation
     still : bool - omega never changes by more than ``moved``: nothing moves inside the bottle
     """
@@ -91,7 +91,7 @@ class Place:
 
     @property
     def text(self) -> str:
-        """What was found, in sentences."""
+        """The result, in sentences."""
         if self.still:
             return (
                 f"{self.solver}: omega stays constant within {self.moved:.1g}, as if nothing moved inside the "
@@ -110,7 +110,7 @@ class Place:
 
     @property
     def advice(self) -> str:
-        """What to do, where no more is known than the place; else nothing."""
+        """What to do, if nothing but the place is known; else empty."""
         lost = not (self.still or self.on_lattice)
         return "look for another restitution, drag or mass than the throw's" if lost else ""
 
@@ -129,13 +129,13 @@ class Place:
 
 
 def name_of(switches: Switches) -> str:
-    """Return the name on the ladder of an equation, or that of its switches."""
-    wanted = canonical(switches)
-    return next((m.name for m in MODELS.values() if canonical(m.switches) == wanted), wanted.name)
+    """Return the name of an equation on the ladder, or that of its switches."""
+    target = canonical(switches)
+    return next((m.name for m in MODELS.values() if canonical(m.switches) == target), target.name)
 
 
 def switches_of(equation: str) -> Switches:
-    """Return the switches of an equation, or of the one a scheme converges to; if that is none, raises ValueError."""
+    """Return the switches of an equation, or of the one a scheme converges to; raises ValueError if there is none."""
     if equation in SCHEMES:
         equation = SCHEMES[equation].model or equation
     if are_switches(equation):
@@ -166,7 +166,7 @@ def place(runner: Runner) -> Place:
 
 
 def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]:
-    """Yield the asks by which a solver is placed, at three levels and at finer ones if need be; return its place."""
+    """Yield the asks that place a solver, at three levels and at finer ones if needed; return its place."""
     changes: list[float | None] = [None] * len(THROWS)
     references = lattice()
     for levels in LEVELS if traits.refined_by is not None else ((0,),):
@@ -178,10 +178,10 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
             continue
         relative = [answer.omega / throw.omega0 for answer, throw in zip(answers, THROWS * len(levels), strict=True)]
         curves, *coarser = (tuple(relative[k : k + len(THROWS)]) for k in range(0, len(relative), len(THROWS)))
-        steps = [_apart(a, b) for a, b in pairwise([curves, *coarser])]
+        steps = [_differences(a, b) for a, b in pairwise([curves, *coarser])]
         if steps:
             changes = [max(of_throw) for of_throw in zip(*steps, strict=True)]
-        distances = {s: max(_apart(curves, reference)) for s, reference in references.items()}
+        distances = {s: max(_differences(curves, reference)) for s, reference in references.items()}
         # Where something else limits the step, coarse levels differ by less than their error.
         if steps and max(map(max, steps)) <= SETTLED and min(distances.values()) <= _room(0.0, 0.0, traits.epsilon):
             break
@@ -190,7 +190,7 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
     moved = max(float(np.max(np.abs(c - 1.0))) for c in curves)
     rooms = [_room(own_change, distances[following], traits.epsilon) for own_change in changes]
     distance, change, room = max(
-        zip(_apart(curves, references[nearest]), changes, rooms, strict=True),
+        zip(_differences(curves, references[nearest]), changes, rooms, strict=True),
         key=lambda of_throw: of_throw[0] / of_throw[2],
     )
     return Place(
@@ -212,15 +212,15 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
     )
 
 
-def _apart(curves: tuple[FloatArray, ...], others: tuple[FloatArray, ...]) -> list[float]:
+def _differences(curves: tuple[FloatArray, ...], others: tuple[FloatArray, ...]) -> list[float]:
     """Return the largest difference of two solvers on each throw."""
     return [float(np.max(np.abs(a - b))) for a, b in zip(curves, others, strict=True)]
 
 
 def _room(change: float | None, following: float, epsilon: float) -> float:
-    """Return the distance that a solver's own change explains; where it has none, a fifth of that to the next one.
+    """Return the distance that a solver's own change explains; without one, a fifth of that to the next equation.
 
-    A distance of 2e-4, what a rest speed of 1e-3 m/s instead of 1e-5 m/s may do, is no other equation.
+    A distance of 2e-4, which a rest speed of 1e-3 m/s instead of 1e-5 m/s may cause, is no other equation.
     """
     return max(2e-4, 64 * epsilon) + (following / 5 if change is None else SURE * change)
 
@@ -249,7 +249,7 @@ class Explanation:
 
     @property
     def text(self) -> str:
-        """The explanation, a line each."""
+        """The explanation, one line per part."""
         first, second = self.first, self.second
         lines = [
             first.text,
@@ -264,15 +264,15 @@ class Explanation:
         return "\n".join(lines)
 
 
-def explain(one: Runner, other: Runner, throw: Scenario) -> Explanation:
+def explain(first_runner: Runner, second_runner: Runner, throw: Scenario) -> Explanation:
     """Place two solvers, throw the bottle with both, and split their difference.
 
     Raises ForeignError if one of them gives no answer.
     """
-    first, second = place(one), place(other)
-    a, b = (runner(ask_of(runner.traits, throw, 3, 1000)) for runner in (one, other))
+    first, second = place(first_runner), place(second_runner)
+    a, b = (runner(ask_of(runner.traits, throw, 3, 1000)) for runner in (first_runner, second_runner))
     values = plateau(a.t, a.omega, throw.omega0), plateau(b.t, b.omega, throw.omega0)
-    # A switch without effect in the equation of one stands as in that of the other.
+    # A switch without effect in one equation is set as in the other.
     start = replace(first.switches, **{name: getattr(second.switches, name) for name in first.inert})
     end = replace(second.switches, **{name: getattr(start, name) for name in second.inert})
     bars = shares(start, end, throw)
@@ -287,8 +287,8 @@ def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
 
     @cache
     def plateau_of(switches: Switches) -> float:
-        flown = curve(switches.name, throw, times_of(throw, 1000))
-        return plateau(flown.t, flown.omega, throw.omega0)
+        flight = curve(switches.name, throw, times_of(throw, 1000))
+        return plateau(flight.t, flight.omega, throw.omega0)
 
     def value(turned: tuple[str, ...]) -> float:
         return plateau_of(canonical(replace(start, **{name: getattr(end, name) for name in turned})))

@@ -1,10 +1,10 @@
 """Programs of other people as processes: each runs in a session of its own, and none outlives flipproof.
 
 Its parent is a shell that waits for it (POSIX): a signal that it sends to its parent ends that shell, and so its run,
-and what it does to its parent's files it does to its own pipes.
+and if it tampers with its parent's files, it only reaches its own pipes.
 
-A keeper process reads from a pipe whose other end this process alone holds. It is told of every program that starts
-and ends; when the pipe closes, because this process ended in whatever way, it ends the programs that are left and all
+A keeper process reads from a pipe whose other end only this process holds. It is notified of every program that starts
+and ends; when the pipe closes, because this process ended in whatever way, it ends the remaining programs and all
 that they started.
 """
 
@@ -24,10 +24,10 @@ from pathlib import Path
 from typing import Any, Final
 
 MARK: Final = "FLIPPROOF_SOLVER"
-"""Environment variable of a solver's process, by which what it leaves behind is known."""
+"""Environment variable of a solver's process, by which processes it leaves behind are recognized."""
 
 KEPT: Final = 4096
-"""Bytes of what a solver prints that are kept, from the end."""
+"""Bytes that are kept of a solver's output, from the end."""
 
 PATIENCE: Final = 2
 """Runs in a row without an answer in time after which a solver is not asked again."""
@@ -35,7 +35,7 @@ PATIENCE: Final = 2
 _MARKS: Final[dict[int, str]] = {}
 _COUNT: Final = itertools.count()
 _KEEPERS: Final[dict[int, subprocess.Popen[bytes]]] = {}
-"""The keeper of this process, by the number of the process: one that was forked from it has its own."""
+"""The keeper of this process, by process id: a process forked from it has its own."""
 
 KEEPER: Final = """
 import glob, os, signal, sys
@@ -58,11 +58,11 @@ for path in glob.glob("/proc/[0-9]*/environ"):
     if marked:
         end(os.kill, int(path.split("/")[2]))
 """
-"""What the keeper runs; its argument is how the marks of this process begin."""
+"""The program of the keeper; its argument is the prefix of this process's marks."""
 
 
 SHELL: Final = 'ulimit -c 0; ulimit -d "$0"; "$@"; exit $?'
-"""What the shell runs; $0 is the memory [kB] that the program may take, the rest are its words."""
+"""The command of the shell; $0 is the memory [kB] that the program may take, the rest is its command line."""
 
 
 def start(words: list[str], memory: float, **pipes: Any) -> subprocess.Popen[bytes]:
@@ -78,26 +78,26 @@ def start(words: list[str], memory: float, **pipes: Any) -> subprocess.Popen[byt
         words = ["/bin/sh", "-c", SHELL, str(min(int(memory), *limits, int(memory)) // 1024), *words]
     _keeper()
     process = subprocess.Popen(words, start_new_session=True, bufsize=0, env=environment, **pipes)
-    _tell(process.pid)
+    _notify_keeper(process.pid)
     _MARKS[process.pid] = mark
     return process
 
 
 def ending(status: int) -> str:
-    """Return how a program ended, in words; a shell says 128 and the signal where one ended it."""
+    """Return how a program ended, as text; a shell's status is 128 plus the signal that ended it."""
     number = -status if status < 0 else status - 128
     names = [member.name for member in signal.Signals if member == number]
     return f"was ended by {names[0]}" if names else f"ended with status {status}"
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """End a process that leads a group, and whatever it started, also in other groups, as far as that is marked."""
+    """End a process that leads a group, and whatever it started, also marked processes in other groups."""
     if os.name == "posix":
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
     process.kill()
     process.wait()
-    _tell(-process.pid)
+    _notify_keeper(-process.pid)
     mark = f"{MARK}={_MARKS.pop(process.pid, '')}".encode()
     for path in Path("/proc").glob("[0-9]*/environ"):
         with contextlib.suppress(OSError):
@@ -106,21 +106,21 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _keeper() -> subprocess.Popen[bytes]:
-    """Return the keeper of this process; start it, also anew if somebody ended it."""
-    mine = os.getpid()
-    if mine not in _KEEPERS or _KEEPERS[mine].poll() is not None:
+    """Return the keeper of this process; start it if it does not run, or restart it if it was ended."""
+    own_pid = os.getpid()
+    if own_pid not in _KEEPERS or _KEEPERS[own_pid].poll() is not None:
         null = subprocess.DEVNULL
-        words = [sys.executable, "-I", "-S", "-c", KEEPER, f"{MARK}={mine}-"]
-        _KEEPERS[mine] = keeper = subprocess.Popen(
+        words = [sys.executable, "-I", "-S", "-c", KEEPER, f"{MARK}={own_pid}-"]
+        _KEEPERS[own_pid] = keeper = subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=null, stderr=null, start_new_session=True, bufsize=0, cwd=os.sep
         )
         for number in _MARKS:
             os.write(keeper.stdin.fileno(), b"%d\n" % number)  # type: ignore[union-attr]
-    return _KEEPERS[mine]
+    return _KEEPERS[own_pid]
 
 
-def _tell(number: int) -> None:
-    """Tell the keeper of a process that leads a group, or by its negative number of its end."""
+def _notify_keeper(number: int) -> None:
+    """Tell the keeper that the process ``number``, which leads a group, has started, or if negative, has ended."""
     with contextlib.suppress(OSError):
         os.write(_keeper().stdin.fileno(), b"%d\n" % number)  # type: ignore[union-attr]
 
@@ -142,7 +142,7 @@ def half_of_memory() -> float:
 
 
 def last_line(printed: bytes) -> str:
-    """Return the last line that names an error, or else the last that says something."""
+    """Return the last line that names an error, or else the last that is not blank."""
     lines = [line for line in printed.decode(errors="replace").splitlines() if line.strip()]
     errors = [line for line in lines if re.match(r"\s*[\w.]*(Error|Exception)\b.*:", line)]
     return " ".join((errors or lines)[-1].split()) if lines else ""

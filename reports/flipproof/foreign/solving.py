@@ -26,7 +26,7 @@ from flipproof.foreign.specs import (
     is_foreign,
     is_spec,
     locate,
-    written,
+    split_spec,
 )
 from flipproof.frame import solvers
 from ode_reference.solver import WATERS
@@ -48,7 +48,7 @@ def solve(
     label: str = "",
     **options: Any,
 ) -> Trajectory:
-    """Run the solver that a spec names, in a process of its own that serves the next run, too.
+    """Run the solver that a spec names, in a process of its own that is kept for the next run.
 
     ``diagnostics["seconds"]`` is how long it took to answer. Raises ForeignError if it gives no answer.
 
@@ -57,8 +57,8 @@ def solve(
     times : array, optional - output times [s]; 1000 uniform ones by default
     effort : float, optional - the number that the solver's ``refined_by`` names; by default that of ``level``
     level : float - refinement: 0 is a thousandth of the flight, each level halves the step
-    timeout : float, optional - seconds that the run may take, instead of what the solver says
-    label : str - the method's name, instead of what the solver says
+    timeout : float, optional - seconds that the run may take, instead of what the solver declares
+    label : str - the method's name, instead of the solver's
     options : passed to the solver by name
     """
     runner = _runner(spec, content_of(spec), timeout)
@@ -83,18 +83,18 @@ def opened(
 ) -> Runner:
     """Return the solver that a spec names, ready to be asked; raises ValueError if it names nothing.
 
-    A run may take ``timeout`` seconds, or what the solver says, and ``memory`` bytes, or half of the machine's.
-    ``given`` are traits of a program or a folder, which cannot say them. With ``curves`` a curve in a file will do,
+    A run may take ``timeout`` seconds, or what the solver declares, and ``memory`` bytes, or half of the machine's.
+    ``given`` are traits of a program or a folder, which cannot declare them. ``curves`` also admits a curve in a file,
     which answers one throw at its own times and nothing else.
     """
     if not is_foreign(spec):
         return Own(solvers.find(spec))
-    how, held = written(spec)
-    if how != OBJECT:
-        if how == COMMAND:
+    kind, body = split_spec(spec)
+    if kind != OBJECT:
+        if kind == COMMAND:
             return Isolated(spec, timeout, memory, traits_of_command(spec, timeout, given))
-        if is_folder(held):
-            return Folder(Path(held), given)
+        if is_folder(body):
+            return Folder(Path(body), given)
         if not curves:
             check_asked(spec)
         return File(spec)
@@ -105,11 +105,11 @@ def opened(
 
 
 _RUNNERS: Final[dict[tuple[str, float | None], tuple[str, Runner]]] = {}
-"""The process of every solver that has been run, by spec and time limit, with the content of its files."""
+"""The process of every solver that has been run, by spec and time limit, with the hash of its files."""
 
 
 def _runner(spec: str, content: str, timeout: float | None) -> Runner:
-    """Return the process of a solver; one whose files have changed gets another, and its old process ends."""
+    """Return the process of a solver; if its files have changed, the old process ends and a new one starts."""
     key = spec, timeout
     if key in _RUNNERS and _RUNNERS[key][0] != content:
         _RUNNERS.pop(key)[1].close()
@@ -129,7 +129,7 @@ class Own(Runner):
 
     def __init__(self, solver: solvers.Solver) -> None:
         self.solver = solver
-        # Column and rods are no equations of slices: they stand on no rung and declare none.
+        # Column and rods are no equations of slices: they are on no rung and declare none.
         equation = None if solver.name in WATERS else solver.name
         order = SCHEMES[solver.name].order if solver.name in SCHEMES else None
         declared: dict[str, dict[str, Any]] = {
@@ -174,9 +174,9 @@ def _points_of(ask: Ask) -> int:
 
 
 def _between(grid: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
-    """Return values at ``times``: those of the grid where it has them, straight lines between."""
+    """Return values at ``times``: those of the grid where it has them, linear between."""
     k = np.clip(np.searchsorted(grid, times), 1, len(grid) - 1)
-    part = np.clip((times - grid[k - 1]) / (grid[k] - grid[k - 1]), 0.0, 1.0)
-    part = np.where(np.abs(part - np.round(part)) < 1e-6, np.round(part), part)
-    part = part.reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray(np.where(part == 1.0, values[k], values[k - 1] + part * (values[k] - values[k - 1])))
+    fraction = np.clip((times - grid[k - 1]) / (grid[k] - grid[k - 1]), 0.0, 1.0)
+    fraction = np.where(np.abs(fraction - np.round(fraction)) < 1e-6, np.round(fraction), fraction)
+    fraction = fraction.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(np.where(fraction == 1.0, values[k], values[k - 1] + fraction * (values[k] - values[k - 1])))

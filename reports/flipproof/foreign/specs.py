@@ -4,16 +4,16 @@
     NAME                               an entry point, group flipproof.solvers or flipproof.engines
     package.module:name                an importable object
     path/to/file.py:name               an object of a file
-    csv:file.csv                       a curve that is there already: columns t, theta, omega
+    csv:file.csv                       an existing curve: columns t, theta, omega
     csv:FOLDER                         questions as files, and the answers that somebody puts beside them
     cmd:"julia mine.jl {scenario} {times} {out}"     any program that reads and writes files
 
 An object is a callable, an object with ``solve(ask)``, or a class of such objects without arguments. Specs are
 strings, so that they can be sent to other processes; each process resolves them for itself.
 
-The same spec may name other code tomorrow, so runs are kept under a hash of what it names: of a file that file alone,
-of a module of a package the whole package, of a program the files that its command names, of a curve its file. What
-code reads or imports from elsewhere is not seen, nor are the modules beside a file.
+The same spec may name other code tomorrow, so runs are kept under a hash of what it names: for a file that file alone,
+for a module the whole package, for a program the files that its command names, for a curve its file. What code reads or
+imports from elsewhere is not hashed, nor are the modules beside a file.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ def offered() -> dict[str, EntryPoint]:
     return {point.name: point for group in groups for point in entry_points(group=group)}
 
 
-def written(spec: str) -> tuple[str, str]:
-    """Return how the spec of a foreign solver is written, and what it holds: a file, a command or an object's name."""
-    how, colon, held = spec.partition(":")
-    return (how, held) if colon and how in (CSV, COMMAND) else (OBJECT, spec)
+def split_spec(spec: str) -> tuple[str, str]:
+    """Return the kind of a foreign solver's spec and its body: a file, a command or an object's name."""
+    kind, colon, body = spec.partition(":")
+    return (kind, body) if colon and kind in (CSV, COMMAND) else (OBJECT, spec)
 
 
 def is_foreign(spec: str) -> bool:
-    """Return whether a spec names another solver than flipproof's own."""
+    """Return whether a spec names a solver that is not flipproof's own."""
     return not are_switches(spec) and spec not in catalogue()
 
 
@@ -64,24 +64,24 @@ def is_spec(name: str) -> bool:
 
 
 def check_spec(spec: str) -> None:
-    """Refuse by a ValueError a spec that names nothing; no foreign code runs."""
-    if written(spec)[0] == OBJECT:
+    """Raise ValueError for a spec that names nothing; no foreign code runs."""
+    if split_spec(spec)[0] == OBJECT:
         locate(spec)
 
 
 def check_asked(spec: str) -> None:
-    """Refuse by a ValueError a curve in a file, which cannot be asked for another throw."""
-    how, held = written(spec)
-    if how == CSV and not is_folder(held):
+    """Raise ValueError for a curve in a file, which cannot be asked for another throw."""
+    kind, body = split_spec(spec)
+    if kind == CSV and not is_folder(body):
         raise ValueError(
             f"solver {spec!r}: a curve cannot be asked; flipproof compare holds it against a solver, and certify "
             "csv:FOLDER writes questions into a folder"
         )
 
 
-def is_folder(held: str) -> bool:
-    """Return whether what stands behind "csv:" is a folder of questions, there or to be made, and no curve."""
-    return Path(held).is_dir() or not (Path(held).exists() or Path(held).suffix)
+def is_folder(path: str) -> bool:
+    """Return whether what follows "csv:" is a folder of questions, existing or new, and no curve."""
+    return Path(path).is_dir() or not (Path(path).exists() or Path(path).suffix)
 
 
 def locate(spec: str) -> EntryPoint | tuple[str, str]:
@@ -89,47 +89,47 @@ def locate(spec: str) -> EntryPoint | tuple[str, str]:
 
     A spec that names nothing raises a ValueError that says how specs are written.
     """
-    how = "package.module:name, file.py:name, csv:file.csv or cmd:'program {scenario} {times} {out}'"
-    place, _, name = spec.rpartition(":")
-    if not place:
+    forms = "package.module:name, file.py:name, csv:file.csv or cmd:'program {scenario} {times} {out}'"
+    source, _, name = spec.rpartition(":")
+    if not source:
         points = offered()
         if spec in points:
             return points[spec]
         if spec.endswith(".py"):
             raise ValueError(f"solver {spec!r}: name the object in the file, too: {spec}:solve")
-        raise ValueError(unknown_name("solver", spec, [*catalogue(), *points]) + f"; or write {how}")
+        raise ValueError(unknown_name("solver", spec, [*catalogue(), *points]) + f"; or write {forms}")
     if not name.isidentifier():
-        raise ValueError(f"solver {spec!r}: {name!r} is no name; write {how}")
-    if place.endswith(".py"):
-        if not Path(place).is_file():
-            raise ValueError(f"solver {spec!r}: there is no file {place}")
-    elif not all(part.isidentifier() for part in place.split(".")):
-        raise ValueError(f"solver {spec!r}: {place!r} is neither a module nor a .py file; write {how}")
-    return place, name
+        raise ValueError(f"solver {spec!r}: {name!r} is no name; write {forms}")
+    if source.endswith(".py"):
+        if not Path(source).is_file():
+            raise ValueError(f"solver {spec!r}: there is no file {source}")
+    elif not all(part.isidentifier() for part in source.split(".")):
+        raise ValueError(f"solver {spec!r}: {source!r} is neither a module nor a .py file; write {forms}")
+    return source, name
 
 
 def words_of(spec: str) -> list[str]:
     """Return the words of a command; raises ValueError if a quotation is not closed."""
     try:
-        return shlex.split(written(spec)[1])
+        return shlex.split(split_spec(spec)[1])
     except ValueError as error:
         raise ValueError(f"solver {spec!r}: {error}") from None
 
 
 def load(spec: str) -> object:
-    """Import what a spec names and return it. This runs foreign code: call it in a process that may be lost."""
+    """Import what a spec names and return it. This runs foreign code: call it in a process that may crash."""
     target = locate(spec)
     solver = target.load() if isinstance(target, EntryPoint) else getattr(_module(target[0]), target[1])
     return solver() if isinstance(solver, type) else solver
 
 
-def _module(place: str) -> object:
-    """Import a module by its name, or run a file as one: from what it holds now, never from a compiled copy."""
-    if not place.endswith(".py"):
+def _module(source: str) -> object:
+    """Import a module by its name, or run a file as one: always from its source, never from a compiled copy."""
+    if not source.endswith(".py"):
         if "" not in sys.path:
             sys.path.insert(0, "")
-        return importlib.import_module(place)
-    path = Path(place).resolve()
+        return importlib.import_module(source)
+    path = Path(source).resolve()
     sys.path.insert(0, str(path.parent))  # a file may import its neighbours
     module = ModuleType(path.stem)
     module.__file__ = str(path)
@@ -159,28 +159,28 @@ def content_of(spec: str) -> str:
 
 
 def files_of(spec: str) -> Iterator[tuple[str, Path]]:
-    """Yield every file that the spec of a foreign solver stands for, with the name by which it counts."""
-    how, held = written(spec)
-    if how == CSV:
+    """Yield every file that the spec of a foreign solver stands for, with the name that is hashed with it."""
+    kind, body = split_spec(spec)
+    if kind == CSV:
         yield from (
-            [("", Path(held))] if not is_folder(held) else ((p.parent.name, p) for p in Path(held).rglob("answer.csv"))
+            [("", Path(body))] if not is_folder(body) else ((p.parent.name, p) for p in Path(body).rglob("answer.csv"))
         )
         return
-    if how == COMMAND:
+    if kind == COMMAND:
         for k, word in enumerate(words_of(spec)):
             file = word.rpartition("=")[2]
-            if os.path.isfile(file):  # which takes a word that is too long for a name, too
+            if os.path.isfile(file):  # unlike Path.is_file, accepts words too long for a name
                 yield str(k), Path(file)
         return
     target = locate(spec)
-    place = target.module if isinstance(target, EntryPoint) else target[0]
-    if place.endswith(".py"):
-        yield Path(place).name, Path(place)
+    source = target.module if isinstance(target, EntryPoint) else target[0]
+    if source.endswith(".py"):
+        yield Path(source).name, Path(source)
     else:
-        yield from _of_module(place.partition(".")[0])
+        yield from _module_files(source.partition(".")[0])
 
 
-def _of_module(name: str) -> Iterator[tuple[str, Path]]:
+def _module_files(name: str) -> Iterator[tuple[str, Path]]:
     """Yield the files of a module or package, which the working folder may hold; none if there is none."""
     try:
         spec = PathFinder.find_spec(name, [str(Path.cwd())]) or find_spec(name)
