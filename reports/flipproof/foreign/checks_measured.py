@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
@@ -160,20 +160,40 @@ def check_order_before(traits: Traits) -> CheckGenerator:
     # Few and long steps: at short ones an order of 4 or more drowns in round-off. Low orders show only at short ones.
     # The order is a limit for short steps: the best of the ratios counts.
     levels = range(-8, -2) if declared > 2 else range(-4, 0)
-    orders, largest = yield from _orders_before(traits, SMOOTH, levels)
+    changes = yield from _changes_before(traits, SMOOTH, levels)
+    orders = _orders(traits, changes)
     if not orders:
-        raise NotApplicableError(f"changes under refinement are round-off, {largest:.2g} of omega_0")
+        raise NotApplicableError(f"changes under refinement are round-off, {max(changes['omega']):.2g} of omega_0")
+    least = declared - ORDER_ROOM
     worst = min(orders, key=lambda name: orders[name])
-    holds, advice = orders[worst] >= declared - ORDER_ROOM, ""
-    if not holds:
+    where = f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves"
+    observed, advice = f"{orders[worst]:.2f} ({worst})", ""
+    if holds := orders[worst] >= least:
+        uneven_changes = yield from _changes_before(traits, SMOOTH, levels, uneven=True)
+        # Output times shorten steps, so that a right answer changes less; where something else limits the step, only
+        # they change it, and such levels do not count.
+        counted = {
+            name: [size if size > 2 * even > 0.0 else 0.0 for even, size in zip(changes[name], sizes, strict=True)]
+            for name, sizes in uneven_changes.items()
+        }
+        uneven = _orders(traits, counted)
+        worst_uneven = min(uneven, key=lambda name: uneven[name], default="")
+        if worst_uneven and uneven[worst_uneven] < least:
+            holds = False
+            observed = (
+                f"{uneven[worst_uneven]:.2f} ({worst_uneven}) where output times cut steps unevenly, else {observed}"
+            )
+            advice = (
+                "take the length of each step, and of the one before, as they are where output times cut them; or "
+                "answer between two steps at the order of the steps"
+            )
+    else:
         for name, throw in CALM.items():
-            orders_without, _ = yield from _orders_before(traits, throw, levels)
-            if orders_without and min(orders_without.values()) >= declared - ORDER_ROOM:
+            orders_without = _orders(traits, (yield from _changes_before(traits, throw, levels)))
+            if orders_without and min(orders_without.values()) >= least:
                 advice = f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}"
                 break
-    low, right = (
-        [name for name, order in orders.items() if (order < declared - ORDER_ROOM) == below] for below in (True, False)
-    )
+    low, right = ([name for name, order in orders.items() if (order < least) == below] for below in (True, False))
     if low and right:
         default_advice = (
             f"{', '.join(right)} of that order: look at how {' and '.join(low)} is advanced in a step, and answered"
@@ -185,28 +205,51 @@ def check_order_before(traits: Traits) -> CheckGenerator:
     return Observation(
         holds=holds,
         expected=f"order {declared:g} or more, within {ORDER_ROOM}",
-        observed=f"{orders[worst]:.2f} ({worst})",
-        where=f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves",
+        observed=observed,
+        where=where,
         advice=advice or default_advice,
         facts={"order_before_impacts": orders[worst], "orders": orders},
     )
 
 
-def _orders_before(
-    traits: Traits, throw: Scenario, levels: Sequence[int]
-) -> Generator[Sequence[Ask], Sequence[Answer], tuple[dict[str, float], float]]:
-    """Return the observed order by field, omitted where changes are round-off, and the largest change of omega."""
-    answers = yield [ask_of(traits, throw, level, points=3) for level in levels]
-    orders: dict[str, float] = {}
-    floor = max(ROUNDOFF, 64 * traits.epsilon)
+def _changes_before(
+    traits: Traits, throw: Scenario, levels: Sequence[int], *, uneven: bool = False
+) -> Generator[Sequence[Ask], Sequence[Answer], dict[str, list[float]]]:
+    """Return by field how much it changes from level to level, a fraction of its largest value.
+
+    Answers are compared at three times; with ``uneven`` others are asked, too, 0.4 and 0.8 of a step apart.
+    """
+    common = throw.duration * (np.array([0.37, 0.71, 1.0]) if uneven else np.array([0.0, 0.5, 1.0]))
+    asks = [ask_of(traits, throw, level, points=3) for level in levels]
+    if uneven:
+        asks = [
+            replace(ask, times=np.union1d(common, _uneven_times(throw.duration, 800.0 * 2.0**level)))
+            for ask, level in zip(asks, levels, strict=True)
+        ]
+    answers = yield asks
+    changes = {}
     for name in FIELDS:
-        if getattr(answers[0], name) is None:
-            continue
-        clear = [change for a, b in pairwise(answers) if (change := _field_difference(a, b, name)) > floor]
-        ratios = [math.log2(a / b) for a, b in pairwise(clear)]
-        if ratios:
-            orders[name] = max(ratios)
-    return orders, max(shift(a, b, throw.omega0) for a, b in pairwise(answers))
+        if getattr(answers[0], name) is not None:
+            values = [getattr(answer, name)[np.searchsorted(answer.t, common)] for answer in answers]
+            changes[name] = [
+                float(np.max(np.abs(a - b)) / max(float(np.max(np.abs(b))), 1e-300)) for a, b in pairwise(values)
+            ]
+    return changes
+
+
+def _orders(traits: Traits, changes: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Return the best observed order by field, omitted where changes are round-off."""
+    floor = max(ROUNDOFF, 64 * traits.epsilon)
+    ratios = {
+        name: [math.log2(a / b) for a, b in pairwise(sizes) if min(a, b) > floor] for name, sizes in changes.items()
+    }
+    return {name: max(values) for name, values in ratios.items() if values}
+
+
+def _uneven_times(end: float, pairs: float) -> FloatArray:
+    """Return times up to ``end`` [s], about ``pairs`` pairs of them, the second twice as long after the first."""
+    ends = end * np.linspace(0.0, 1.0, max(2, round(pairs) + 1))
+    return np.union1d(ends[1:], ends[1:] - np.diff(ends) * 2 / 3)
 
 
 def check_order_across(traits: Traits) -> CheckGenerator:

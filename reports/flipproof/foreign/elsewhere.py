@@ -211,21 +211,31 @@ SMALL: Final = replace(
 SLOW: Final = replace(PAPER, slices=5, start="scattered", omega0=0.45, gravity=0.005, damping=0.05, angle=6.0)
 """A bottle that turns once in 14 s: shows a cut-off of spins, accelerations or durations."""
 
+NARROW: Final = replace(PAPER, mass=0.5, length=0.14, filling=0.996, slices=1, start="scattered")
+"""A single slice with half a millimetre of room: water that is taken for ice if it has little room shows here."""
+
+NO_SCALE: Final = "the equation has no scale of its own: look for a constant in "
+
 SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
     {
         SMALL: (
             replace(SMALL, mass=2.7, length=0.24, radius=0.09, capacity=5.4, gravity=60.0),
             "right in a bottle of 0.24 m, wrong in one of 8 mm that moves in proportion",
-            "m, kg, kg/s or m/s, such as a least height, room, mass, drag or speed",
+            f"{NO_SCALE}m, kg, kg/s or m/s, such as a least height, room, mass, drag or speed",
         ),
         SLOW: (
             replace(SLOW, omega0=18.0, gravity=8.0, damping=2.0),
             "right at 18 rad/s, wrong at 0.45 rad/s where everything moves in proportion",
-            "rad/s, m/s, m/s^2, 1/s or s, such as a least spin, speed, weight, drag or a longest flight",
+            f"{NO_SCALE}rad/s, m/s, m/s^2, 1/s or s, such as a least spin, speed, weight, drag or a longest flight",
+        ),
+        NARROW: (
+            replace(NARROW, filling=0.5),
+            "right in a bottle half full, wrong in one in which water has half a millimetre of room",
+            "water moves however little room it has: look for a least room, or for water that is taken for ice",
         ),
     }
 )
-"""The same flights on other scales; if these are right: what is wrong, and units of the constant to look for."""
+"""Throws that differ from one of these in its scale or room alone: how wrong is told from right, and the advice."""
 
 COUNT: Final = 16
 """Throws of a seed: they hold every level, and eight of nine pairs of levels of two factors."""
@@ -561,7 +571,7 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
     if not place.on_lattice or place.equation != name_of(switches_of(equation)):
         raise NotApplicableError("needs an equation that the solver is found to solve")
     unrefined = min(0.01 + 4 * place.distance, 0.018)  # as far off as on the throws that place it, below blurring
-    throws = (*drawn(seed), SMALL, SLOW)
+    throws = (*drawn(seed), SMALL, SLOW, NARROW)
     flights = list(zip(throws, (yield from comparing(traits, throws, seed, equation, unrefined)), strict=True))
     # Where a solver of low order errs less by luck, it is held to no more than its typical error.
     typical_error = (
@@ -631,10 +641,9 @@ def bisected(
         traits, throws, seed, equation, unrefined
     )
     if knobs in SIMILAR:
-        similar, text, units = SIMILAR[knobs]
+        similar, text, advice = SIMILAR[knobs]
         (scaled,) = yield from compare_all([similar])
         if not scaled.wrong:
-            advice = f"the equation has no scale of its own: look for a constant in {units}"
             return f"{text}: {_wrong_text(comparison)}", advice
     wrong_text, together = _wrong_text(comparison), TOGETHER if knobs is FULL else ""
     names = [name for name in WORDS if getattr(knobs, name) != getattr(PAPER, name)]

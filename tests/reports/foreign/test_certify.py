@@ -577,15 +577,11 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("cached_by_number_of_slices", "determinism", "keep nothing under a part of the throw"),
         ("ice_starts_at_zero", "ice", "let theta go on from theta_0"),
         ("flight_ends_at_half_a_second", "piecewise", "the answer stands still there, first at t = 0.5"),
-        ("rest_of_step_lost", "angle", "over the rest of a step"),
         ("answers_cached_without_start", "start", "cache nothing by throw"),
         ("restitution_hardcoded", "inputs", "with another restitution"),
         ("tolerance_of_the_module", "refinement", "or declare no refined_by"),
-        ("adaptive_cap_rebound_put_on_base", "piecewise", "with an impact on the cap, in none of"),
         ("adaptive_leaves_off_just_before_answer", "velocity", "theta stands still between two of the times asked"),
-        ("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating"),
         ("fixed_omega_from_differences", "start", "not a slope of theta"),
-        ("halving_drag_of_momentum", "piecewise", "x the drag alpha v_CM / m besides"),
         ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
         pytest.param(
             "halving_released_level", "mirror", "right without weight: look at the weight", marks=pytest.mark.slow
@@ -602,6 +598,9 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
 @pytest.mark.parametrize(
     ("mistake", "check", "advice"),
     [
+        ("rest_of_step_lost", "angle", "over the rest of a step"),
+        ("adaptive_cap_rebound_put_on_base", "piecewise", "with an impact on the cap, in none of"),
+        ("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating"),
         ("answers_cached_without_start", "inputs", "keep no answer under a part of the question"),
         ("remembered_by_the_mean_of_the_start", "inputs", "with another start of the same mean"),
         ("closed_form_momentum_remembered", "start", "compute J_0 from ask.start"),
@@ -619,6 +618,8 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
             "order-before-impacts",
             "of that order without drag: look at the instant",
         ),
+        ("equal_step_weights", "order-before-impacts", "where output times cut steps unevenly"),
+        ("straight_line_across_the_step", "order-before-impacts", "or answer between two steps at the order of the"),
         ("lists_speeds_by_differences", "velocity", "not a slope of r from one of them to the next"),
         ("lists_in_pairs", "piecewise", "of an odd number of slices, in none of"),
         ("closed_form_rest_of_the_step", "piecewise", "steps without an impact have a higher order"),
@@ -635,15 +636,17 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
                 ("slices_at_least_a_millimetre", "elsewhere", "look for a constant in m, kg, kg/s"),
                 ("reduced_free_slow_spin_not_scaled", "elsewhere", "look for a constant in rad/s"),
                 ("only_what_moves_is_struck", "restitution", "look at e at the cap, and at the slices that rest"),
+                ("halving_drag_of_momentum", "piecewise", "x the drag alpha v_CM / m besides"),
                 ("ice_gathers_speed", "elsewhere", "its v is 0 and stays 0"),
                 ("first_found_is_first", "elsewhere", "of several in a step the earliest"),
+                ("nearly_full_is_ice", "elsewhere", "look for a least room, or for water that is taken for ice"),
                 ("opposite_hits_cancel", "elsewhere", "slices strike both ends at one"),
             )
         ),
     ],
 )
 def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    lists = ("first", "second", "fifth", "seventh", "eighth", "ninth", "eleventh", "twelfth", "thirteenth")
+    lists = ("first", "second", "fourth", "fifth", "seventh", "eighth", "ninth", "eleventh", "twelfth", "thirteenth")
     solver = next(each[mistake] for each in map(patches, lists) if mistake in each).solver()
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
