@@ -23,7 +23,7 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool) -> str:
     still = [i.time for i in intervals if np.ptp(i.theta) == 0.0]
     if len(still) > 0.8 * len(intervals):
         return f"the answer stands still there, first at t = {min(still):.3g} s"
-    if all(not np.any(i.v) and not np.any(np.diff(i.r, axis=0)) for i in intervals):
+    if all(not np.any(i.v) and not np.any(np.diff(i.r, axis=0)) for i in intervals) and any(map(_off_ends, intervals)):
         return "its slices do not move: look at what is taken for ice"
     # Answers may be arbitrary; no cause can be found for numbers that overflow.
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
@@ -119,11 +119,17 @@ def _restitution_cause(intervals: Sequence[Interval]) -> str:
     narrow = [e for e, (low, high) in sorted(ends.items()) if high - low < 0.1 * abs(high)]
     if not narrow:
         return "the slice that strikes leaves with another speed"
-    wrong = [e for e in narrow if abs(np.median(measured[e]) - e) > 0.02 * e]
+    wrong = [e for e in narrow if abs(np.median(measured[e]) - e) > max(0.003 * e, 2.0 * float(np.ptp(ends[e])))]
     if not wrong:
         return "look at how the time of an impact is found: the slice that strikes leaves with the right e"
-    e_text = " and ".join(f"{np.median(measured[e]):.2g} where it is {e:.3g}" for e in wrong)
+    e_text = " and ".join(f"{np.median(measured[e]):.3g} where it is {e:.3g}" for e in wrong)
     return f"the slice that strikes leaves as if e were {e_text}"
+
+
+def _off_ends(interval: Interval) -> bool:
+    """Return whether a slice begins an interval farther than a thousandth of the bottle's length from both ends."""
+    throw, room = interval.throw, 1e-3 * interval.throw.bottle.length
+    return bool(np.any((interval.r[0] > throw.r_min + room) & (interval.r[0] < throw.r_max - room)))
 
 
 def _delay(interval: Interval, index: int) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final
@@ -137,6 +137,14 @@ def check_determinism(traits: Traits) -> CheckGenerator:
     )
 
 
+IGNORED: Final[Mapping[str, str]] = {
+    "another restitution": "; or no slice strikes an end: look at what moves them",
+    "another capacity of the bottle": "; the capacity gives the height of a slice, by half of which its places end "
+    "before the ends of the bottle",
+}
+"""What to look at besides, if this alone is ignored."""
+
+
 def check_inputs(traits: Traits) -> CheckGenerator:
     """Whatever part of the question is changed alone, the answer changes."""
     bottle, stacked = THROW.bottle, THROW.initial_positions()
@@ -180,7 +188,7 @@ def check_inputs(traits: Traits) -> CheckGenerator:
         else "other numbers each time",
         where=f"{len(variants)} parts of the question, each changed alone after the throw of most checks",
         advice="read it from the question, and keep no answer under a part of the question"
-        + ("; or no slice strikes an end: look at what moves them" if ignored == ["another restitution"] else ""),
+        + (IGNORED.get(ignored[0], "") if len(ignored) == 1 else ""),
     )
 
 
@@ -466,12 +474,14 @@ def check_velocity(traits: Traits) -> CheckGenerator:
             where=f"0.05 s, asked at {len(times)} and at {len(answers[0].t)} times",
             advice="v is the state's at each of ask.times, not a slope of r from one of them to the next",
         )
+    constant = not np.ptp(answers[0].v, axis=0).any()
     return Observation(
         holds=sizes[0] <= bound or (_falls(sizes) and sizes[-1] < 1e-2),
         expected=f"v = dr/dt within {bound:.1g} of the largest v, or a difference that falls with refinement",
         observed=f"off by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
         where="0.05 s",
         advice=_times_advice(answers[0])
+        + ("v is the same at all times: answer a copy of each state; " if constant else "")
         + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )

@@ -8,6 +8,7 @@ what they consist of (``causes``). Needs r and v.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from typing import Final
@@ -38,6 +39,16 @@ Right solvers of such an order among the benchmarks leave at most 1e-6 there, mi
 
 LEVELS: Final = (0, 2, 4)
 """Levels of refinement; the last one only if there are departures at the others."""
+
+LONG: Final = -3
+"""Level of steps so long that an impact is overlooked if a part of a step is not searched for it."""
+
+EXACT: Final = 1e-7
+OVERLOOKED: Final = 1e-3
+"""Departures of most impacts at steps so long if each is located, and of one that is overlooked.
+
+Right solvers whose median is below the first leave the second at one impact at the most.
+"""
 
 FALLS: Final = 0.4
 """Fraction of a departure that remains at a quarter of the step, if only the step causes it."""
@@ -121,13 +132,27 @@ DepartureGenerator = Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]
 def departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureGenerator:
     """Return between which outputs of throws a solver departs from an equation, and by what; empty if it does not.
 
-    Asks for each throw again, at ``OUTPUTS`` times, at two or three levels if the solver can be refined. Raises
+    Asks for each throw again, at ``OUTPUTS`` times, at two to four levels if the solver can be refined. Raises
     NotApplicableError if the answers lack r or v.
     """
     if traits.refined_by is None:
         intervals = yield from _intervals_at(traits, equation, asks, 0)
         departs = _departs(traits, intervals, None)
         return _describe(equation, intervals, departs) if departs.sum() >= FEW else ("", "")
+    departure = yield from _departing(traits, equation, asks)
+    if not departure[0]:
+        with suppress(ForeignError):
+            if overlooked := _overlooked((yield from _intervals_at(traits, equation, asks, LONG))):
+                effort = effort_of(traits, asks[0].scenario, LONG)
+                return (
+                    f"{overlooked} at {traits.refined_by} = {effort:.2g}",
+                    "impacts in a part of a long step are overlooked: look at where in a step they are searched for",
+                )
+    return departure
+
+
+def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureGenerator:
+    """Return the same for a solver that can be refined, at short steps."""
     coarse: list[Interval] = []
     spoiled = ("", "")
     for level in LEVELS:
@@ -214,6 +239,15 @@ def _spoiled(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval
         "steps without an impact have a higher order: look at the instant of the speed with which a slice strikes, "
         "and at the rest of the step after the impact",
     )
+
+
+def _overlooked(intervals: Sequence[Interval]) -> str:
+    """Return at how many impacts a solver departs that locates most of them exactly."""
+    sizes = np.array([interval.size for interval in intervals if interval.hits])
+    count = int(np.sum(sizes > OVERLOOKED))
+    if count < FEW or np.median(sizes) > EXACT:
+        return ""
+    return f"in {count} of {len(sizes)} intervals with an impact"
 
 
 def _passed_over(coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:

@@ -624,19 +624,22 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
             )
         observed = f"at most {largest:.2g} of omega_0 off, its own error {own_error:.2g}"
         return Observation(holds=True, expected=expected, observed=observed, weak=weak_text, facts=facts)
-    observed, advice = yield from bisected(traits, *wrong[0], seed, equation, unrefined)
+    observed, impacts, advice = yield from bisected(traits, *wrong[0], seed, equation, unrefined)
     if not (wrong[0][0].frozen or wrong[0][1].error):
         with suppress(ForeignError, NotApplicableError):
             departure, cause = yield from departing(traits, equation, [wrong[0][0].ask(seed)])
-            advice = f"{departure and f'there it departs {departure}; '}{cause and f'{cause}; '}{advice}"
+            if departure:  # more exact than the impact after which the whole flight is first wrong
+                together = TOGETHER if wrong[0][0] is FULL else ""
+                impacts = f"there it departs {departure}; {cause and f'{cause}; '}{together}"
+    advice = f"{impacts}{advice}".removesuffix("; ")
     where = f"{len(wrong)} of {len(flights)} throws"
     return Observation(holds=False, expected=expected, observed=observed, where=where, advice=advice, facts=facts)
 
 
 def bisected(
     traits: Traits, knobs: Knobs, comparison: Comparison, seed: int, equation: str, unrefined: float
-) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]:
-    """Return a sentence that separates right from wrong by one knob, and what to look at."""
+) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, str, str]]:
+    """Return a sentence that separates right from wrong by one knob, and what to look at: of impacts, and besides."""
     compare_all: Callable[[Sequence[Knobs]], ComparisonsGenerator] = lambda throws: comparing(  # noqa: E731
         traits, throws, seed, equation, unrefined
     )
@@ -644,7 +647,7 @@ def bisected(
         similar, text, advice = SIMILAR[knobs]
         (scaled,) = yield from compare_all([similar])
         if not scaled.wrong:
-            return f"{text}: {_wrong_text(comparison)}", advice
+            return f"{text}: {_wrong_text(comparison)}", "", advice
     wrong_text, together = _wrong_text(comparison), TOGETHER if knobs is FULL else ""
     names = [name for name in WORDS if getattr(knobs, name) != getattr(PAPER, name)]
     paper, ice = replace(PAPER, frozen=knobs.frozen), "in ice " if knobs.frozen else ""
@@ -654,7 +657,7 @@ def bisected(
         simpler_advice = (
             "" if knobs.frozen or fields else (yield from simpler_throws_advice(traits, equation, unrefined))
         )
-        return f"{ice}{_wrong_text(base)} on the paper's throw, too", f"{simpler_advice}{fields}"
+        return f"{ice}{_wrong_text(base)} on the paper's throw, too", "", f"{simpler_advice}{fields}"
     single = [_shortened(replace(paper, **{name: getattr(knobs, name)}), seed, FEW_IMPACTS) for name in names]
     trials = sorted(zip(names, single, (yield from compare_all(single)), strict=True), key=lambda row: -row[2].excess)
     for name, throw, trial in trials:
@@ -662,7 +665,8 @@ def bisected(
         if result.wrong:
             return (
                 f"{ice}right at {knob_text(PAPER, name)}, wrong at {knob_text(knobs, name)}: {_wrong_text(result)}",
-                (together or _impact_advice(result)) + (_field_advice(result, ice=knobs.frozen) or WORDS[name][1]),
+                together or _impact_advice(result),
+                _field_advice(result, ice=knobs.frozen) or WORDS[name][1],
             )
     reverted = yield from compare_all([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
     decisive = [name for name, result in zip(names, reverted, strict=True) if not result.wrong and result.share > 0.3]
@@ -673,12 +677,13 @@ def bisected(
         )
         return (
             f"{ice}right at {paper_words}, wrong at {throw_words} where other things are changed, too: {wrong_text}",
-            f"{together or _impact_advice(comparison)}{'; or '.join(WORDS[name][1] for name in decisive)}"
-            f"{_field_advice(comparison, '; ', ice=knobs.frozen)}",
+            together or _impact_advice(comparison),
+            f"{'; or '.join(WORDS[name][1] for name in decisive)}{_field_advice(comparison, '; ', ice=knobs.frozen)}",
         )
     return (
         f"{ice}{wrong_text} where {', '.join(knob_text(knobs, name) for name in names)}",
-        f"{together or _impact_advice(comparison)}{_field_advice(comparison, ice=knobs.frozen)}",
+        together or _impact_advice(comparison),
+        _field_advice(comparison, ice=knobs.frozen),
     )
 
 
