@@ -34,6 +34,12 @@ SCALE_ERROR: Final = 0.03
 EXCHANGED: Final = 20.0
 """Logarithm of a ratio of likelihoods: a film that gains more by exchanging cap and base is refused."""
 
+JUMP: Final = 0.35
+"""Jump of both ends from one frame to the next, fraction of the bottle's length, that no hand makes.
+
+Hands of simulated films leave 0.07 at the most.
+"""
+
 SHOWN: Final = ("gamma", "restitution", "omega0", "theta0", "release", "touch", "tilt", "g", "noise", "length")
 
 
@@ -194,9 +200,29 @@ class Assessment:
                     f"{film.label}: no flight fits better than {1e3 * self.noise:.2g} mm: are cap and base exchanged, "
                     "or other things clicked?"
                 )
+            self._check_origin()
             self._check_release()
         if film.quantity != "omega":
             self._check_rates()
+
+    def _check_origin(self) -> None:
+        """Refuse clicks of which both ends jump alike from one frame to the next, before the touch."""
+        estimate, film = self.estimate, self.estimate.film
+        steps, moves = np.diff(film.t), np.diff(film.values, axis=1)
+        jumps = moves[:, 1:-1] - (moves[:, :-2] + moves[:, 2:]) / 2  # 0 for what moves steadily
+        size = np.hypot(*jumps.mean(axis=0).T)
+        alike = np.hypot(*(jumps[0] - jumps[1]).T) < 0.3 * size
+        # A frame that is clicked elsewhere, and returns, changes the move after it, too.
+        alike &= np.hypot(*(moves[:, 2:] - moves[:, :-2]).mean(axis=0).T) < 0.5 * size
+        even = np.abs(steps[1:-1] - (steps[:-2] + steps[2:]) / 2) < 0.1 * steps[1:-1]
+        before_touch = film.t[3:] < estimate.likelihood.touch
+        sizes = np.where(alike & even & before_touch, size, 0.0)
+        k = int(np.argmax(sizes)) if len(sizes) else 0
+        if len(sizes) and sizes[k] > JUMP * estimate.best["length"]:
+            raise UnsoundError(
+                f"{film.label}: both ends jump by {sizes[k]:.2g} m from {film.t[k + 1]:.3f} to {film.t[k + 2]:.3f} s: "
+                "click one clip, with one origin in all of its frames"
+            )
 
     def _check_release(self) -> None:
         """Refuse a release before which the bottle already falls freely."""

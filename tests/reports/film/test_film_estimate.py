@@ -1,5 +1,6 @@
 """Films of known truth: the estimate holds it, says what it cannot tell, and refuses what cannot be right."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import film_simulator
@@ -270,6 +271,19 @@ def test_an_estimate_that_begins_in_free_flight_is_refused(quick):
     moved = replace(one, draws=one.draws | {"release": one.draws["release"] + 0.12})
     with pytest.raises(UnsoundError, match="falls freely by its clicks alone: the flight begins earlier"):
         Assessment(moved)._check_release()
+
+
+@pytest.mark.parametrize(
+    ("shift", "frames", "refused"),
+    [(0.15, slice(4, None), True), (-0.5, slice(9, None), True), (0.03, slice(4, None), False), (0.5, 4, False)],
+)
+def test_an_origin_that_moves_is_refused_and_one_frame_clicked_elsewhere_is_not(quick, shift, frames, refused):
+    one = quick[1].estimate
+    values = one.film.values.copy()
+    values[:, frames, 0] += shift
+    moved = Assessment(replace(one, film=replace(one.film, values=values)))
+    with pytest.raises(UnsoundError, match="both ends jump by") if refused else nullcontext():
+        moved._check_origin()
 
 
 @pytest.mark.parametrize("which", ["poor", "eq8"])
