@@ -26,7 +26,7 @@ PAGES = {
     "docs/landing.md": "The landing", "docs/own-solver.md": "Your own solver", "docs/bounce.md": "Bounces",
     "docs/compare.md": "Compare", "docs/events.md": "Problems with events",
     "docs/film.md": "Films", "docs/commands.md": "Commands", "docs/sweeps.md": "Sweeps",
-    "docs/howto.md": "How to add a thing", "docs/house.md": "Scope and costs",
+    "docs/howto.md": "How to add a thing", "CONTRIBUTING.md": "Where things live", "docs/house.md": "Scope and costs",
     "docs/dependencies.md": "Dependencies",
 }  # fmt: skip
 """File -> its name in the site's contents, in their order."""
