@@ -13,7 +13,7 @@ from flipproof.chapters.solvers import WITNESSES
 from flipproof.chapters.work_precision.contenders import Effort, Grids
 from flipproof.frame.gather import Gathered
 from flipproof.frame.pool import SerialExecutor
-from flipproof.output.provenance import provenance
+from flipproof.frame.provenance import provenance
 from slicemodel import Scenario
 
 LOOPS = (

@@ -15,8 +15,8 @@ from flipproof.figures.style import Drawing
 from flipproof.frame.flights import Flights
 from flipproof.frame.gather import Gathered, evaluate, gather
 from flipproof.frame.pool import SerialExecutor, make_each
+from flipproof.frame.provenance import provenance
 from flipproof.frame.solvers import Run, RunResult
-from flipproof.output.provenance import provenance
 from flipproof.output.summary import summarise
 from flipproof.page.render import render
 from flipproof.page.verdict import verdict

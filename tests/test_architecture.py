@@ -171,11 +171,13 @@ def test_the_frame_knows_no_subject_and_chapters_are_named_once():
 
 FLOORS = (
     ("figures",),
-    ("frame", "output", "curves"),
-    ("foreign", "bounce"),
-    ("sweep",),
+    ("frame",),
+    ("output",),
+    ("curves", "paper"),
+    ("foreign",),
+    ("bounce", "sweep"),
     ("film",),
-    ("chapters", "paper"),
+    ("chapters",),
     ("page",),
     ("presets", "build", "check", "testing", "pytest_plugin"),
     ("cli", "__main__", "__init__"),

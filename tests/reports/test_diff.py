@@ -19,10 +19,10 @@ from flipproof.check.diff import Change, change_of, compare_summaries, read_summ
 from flipproof.check.diff_page import read_curves
 from flipproof.check.report_pair import differences, figure_report_pair
 from flipproof.frame import pool, solvers
+from flipproof.frame.columns import curves_csv
 from flipproof.frame.findings import Band, Finding
 from flipproof.frame.gather import evaluate, gather
-from flipproof.output.columns import curves_csv
-from flipproof.output.provenance import provenance
+from flipproof.frame.provenance import provenance
 from flipproof.output.summary import summarise, summary_text
 from flipproof.page.verdict import verdict
 from slicemodel import Scenario, schemes

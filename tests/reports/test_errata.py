@@ -8,6 +8,7 @@ import pytest
 
 from flipproof.chapters.errata import chapter as errata
 from flipproof.chapters.errata import equations, programs
+from flipproof.paper import cost
 from slicemodel import Bottle, Scenario
 
 THROW = Scenario()
@@ -106,12 +107,12 @@ def test_epsilon_agrees_if_the_bottle_is_the_cylinder_it_is_said_to_be():
 
 
 def test_cost_is_linear_in_slices_and_only_the_matlab_program_is_quadratic_in_steps():
-    assert programs.exponents_of_cost(copies_history=False) == pytest.approx((1.0, 1.0), abs=0.02)
-    assert programs.exponents_of_cost(copies_history=True) == pytest.approx((1.0, 2.0), abs=0.05)
+    assert cost.exponents_of_cost(copies_history=False) == pytest.approx((1.0, 1.0), abs=0.02)
+    assert cost.exponents_of_cost(copies_history=True) == pytest.approx((1.0, 2.0), abs=0.05)
 
 
 def test_counting_counts():
-    one, two = (programs.count_operations(n, 3, copies_history=False) for n in (10, 20))
+    one, two = (cost.count_operations(n, 3, copies_history=False) for n in (10, 20))
     assert two == 2 * one > 0
 
 

@@ -8,7 +8,7 @@ import ode_reference
 from flipproof.build import ask_of, build, gather_report
 from flipproof.film.measured import HELD, hold, part_measured, read_measured
 from flipproof.frame.pool import SerialExecutor
-from flipproof.output.provenance import provenance
+from flipproof.frame.provenance import provenance
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Scenario
 

@@ -10,9 +10,9 @@ import jsonschema
 import numpy as np
 import pytest
 
+from flipproof.frame.columns import columns_csv, curves_csv, rows_csv
 from flipproof.frame.findings import Band, Finding, regression
 from flipproof.frame.gather import ChapterResult
-from flipproof.output.columns import columns_csv, curves_csv, rows_csv
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SUMMARY_VERSION, json_ready, schema_text, summarise, summary_text
 

@@ -10,7 +10,7 @@ from flipproof.chapters import parts
 from flipproof.chapters.horizon.chapter import Reach
 from flipproof.chapters.overlap.chapter import Amount
 from flipproof.frame.pool import SerialExecutor
-from flipproof.output.provenance import provenance
+from flipproof.frame.provenance import provenance
 from slicemodel import Scenario
 
 SMALL = {

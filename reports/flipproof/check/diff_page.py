@@ -14,7 +14,7 @@ from flipproof.check.diff import HEADINGS, Comparison
 from flipproof.check.report_pair import differences, figure_report_pair
 from flipproof.figures.spoken import inert
 from flipproof.figures.style import draw
-from flipproof.output.columns import Series
+from flipproof.frame.columns import Series
 from flipproof.output.templating import environment
 
 

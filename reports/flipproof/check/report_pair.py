@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import new_figure, shared_legend, styled
-from flipproof.output.columns import Series
+from flipproof.frame.columns import Series
 from slicemodel.trajectory import FloatArray
 
 

@@ -174,7 +174,7 @@ def add_json(command: argparse.ArgumentParser, content: str) -> None:
 def write_json(path: Path | None, mapping: Mapping[str, Any]) -> None:
     """Write a mapping into the file that ``--json`` names, if any; what JSON cannot say becomes text."""
     if path is not None:
-        from flipproof.output.columns import json_ready
+        from flipproof.frame.columns import json_ready
         from flipproof.output.folder import write_text
 
         write_text(path, json.dumps(json_ready(mapping), indent=1, ensure_ascii=False, allow_nan=False) + "\n")

@@ -95,8 +95,8 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
 
 def command_film(options: argparse.Namespace) -> int:
     """Fit films, print the estimates and write the folder; return 1 for a film that cannot be right."""
+    from flipproof.frame.provenance import provenance
     from flipproof.output.folder import check_replaceable, replaced_folder
-    from flipproof.output.provenance import provenance
 
     if options.out is not None:
         check_replaceable(options.out, options.kind)

@@ -160,7 +160,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
-    from flipproof.output.provenance import version_of
+    from flipproof.frame.provenance import version_of
 
     top = FirstScreen(prog="flipproof")
     top.add_argument("--version", action="version", version=f"flipproof {version_of('flipproof')}")
@@ -235,7 +235,7 @@ def command_report(options: argparse.Namespace) -> int:
     from flipproof.film.measured import part_measured
     from flipproof.frame.gather import Stages
     from flipproof.frame.pool import workers
-    from flipproof.output.provenance import provenance
+    from flipproof.frame.provenance import provenance
 
     began = time.perf_counter()
     guests = invited(options.guests, options.timeout)

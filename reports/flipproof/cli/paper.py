@@ -28,7 +28,7 @@ def command_paper(options: argparse.Namespace) -> int:
 
     names = check_figures(options.figure)
 
-    from flipproof.output.provenance import provenance
+    from flipproof.frame.provenance import provenance
     from flipproof.paper.figures import make_gallery
 
     with store_of(options) as store, progress_bar("figures", "group") as progress:

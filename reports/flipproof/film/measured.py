@@ -15,9 +15,9 @@ from flipproof.film.judge import Assessment, compared, ranked
 from flipproof.film.likelihood import Film
 from flipproof.film.page import figure_film
 from flipproof.frame.chapter import Ask, Call, Chapter, Part, Study
+from flipproof.frame.columns import columns_csv
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.findings import Finding, observed
-from flipproof.output.columns import columns_csv
 from slicemodel import Scenario
 
 HELD: Final = {"published-python": "published program", "midpoint": "Eq. 8", "free-flight": "free flight"}

@@ -14,7 +14,7 @@ from flipproof.figures.style import draw, new_figure, solver_style, styled
 from flipproof.film.clip import SCHEMA, schema_comments, smoothed_rate
 from flipproof.film.estimate import UNITS
 from flipproof.film.judge import SHOWN, Assessment, compared
-from flipproof.output.columns import rows_csv
+from flipproof.frame.columns import rows_csv
 from flipproof.output.folder import write_text
 from flipproof.output.templating import environment
 from slicemodel.trajectory import FloatArray

@@ -15,9 +15,9 @@ import numpy as np
 from flipproof.foreign import checks_basic, checks_measured, elsewhere
 from flipproof.foreign.checking import Check, NotApplicableError, Observation, drive
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
+from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
-from flipproof.output.columns import json_ready
-from flipproof.output.provenance import version_of
+from flipproof.frame.provenance import version_of
 from slicemodel.scenario import unknown_name
 
 PASSED: Final = "passed"

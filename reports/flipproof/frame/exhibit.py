@@ -10,8 +10,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from flipproof.figures.style import Drawing, draw
+from flipproof.frame.columns import Series
 from flipproof.frame.flights import chapter_errors
-from flipproof.output.columns import Series
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

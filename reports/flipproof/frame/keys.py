@@ -16,8 +16,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from flipproof.frame.provenance import PACKAGES, version_of
 from flipproof.frame.solvers import Run, find
-from flipproof.output.provenance import PACKAGES, version_of
 from slicemodel import IMPORTED
 
 SOURCES: Final[Mapping[str, tuple[str, ...]]] = {

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 import ode_reference
-from flipproof.output.columns import json_ready
+from flipproof.frame.columns import json_ready
 from flipproof.output.folder import write_text
 from flipproof.output.tables import trajectory_csv
 from slicemodel.scenario import Scenario

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from flipproof.frame.columns import json_ready
 from flipproof.frame.exhibit import Exhibit
 from flipproof.frame.gather import ChapterResult, Gathered
 from flipproof.frame.solvers import RunResult
-from flipproof.output.columns import json_ready
 
 SUMMARY_VERSION: Final = 2
 """Rises when a reader of the last version would misread the next."""

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.output.columns import Series
+from flipproof.frame.columns import Series
 from slicemodel import Trajectory
 from slicemodel.scenario import UnsuitableFileError, read_text, shortened
 from slicemodel.trajectory import FloatArray

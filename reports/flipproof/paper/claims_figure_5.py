@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.chapters.errata.programs import SQUARE, exponents_of_cost
 from flipproof.frame.solvers import Missing
 from flipproof.paper import observe
 from flipproof.paper.cases import number, numbers, paper_steps, paper_throw
+from flipproof.paper.cost import SQUARE, exponents_of_cost
 from flipproof.paper.observe import FLAT, FLAT_WHY, SUPERIMPOSED, CaseFlights
 from flipproof.paper.runs import MANY_SLICES, MANY_STEPS, MANY_STEPS_KEY, PUBLISHED, SAME_STEPS_KEY
 from flipproof.paper.statements import OMEGA, Read, Reading, Statement, at_least, at_most, states

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Final
 
 from flipproof.frame.chapter import Ask, Chapter, Part, Study
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.gather import gather
 from flipproof.frame.pool import Progress, workers
 from flipproof.frame.run_store import RunStore
-from flipproof.output.columns import rows_csv
 from flipproof.output.folder import check_replaceable, replaced_folder
 from flipproof.output.templating import environment
 from flipproof.paper import figures_bottle, figures_curves, figures_levels

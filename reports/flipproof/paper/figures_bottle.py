@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 from flipproof.figures.spoken import SPOKEN
 from flipproof.figures.style import new_figure, styled
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.exhibit import Exhibit
-from flipproof.output.columns import rows_csv
 from flipproof.paper.cases import HALF_FULL, family
 from flipproof.paper.figures_panels import COLUMN, RAMP, Recipe, exhibit, head, legend_below, listed, settings_words
 from flipproof.paper.runs import SOLVERS, PaperRuns

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from flipproof.figures.spoken import SPOKEN
 from flipproof.figures.style import new_figure, solver_style, styled
+from flipproof.frame.columns import columns_csv
 from flipproof.frame.exhibit import Exhibit
-from flipproof.output.columns import columns_csv
 from flipproof.paper.runs import BANDS, SOLVERS, PaperRuns
 from slicemodel.trajectory import FloatArray
 

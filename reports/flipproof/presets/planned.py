@@ -43,9 +43,9 @@ from flipproof.chapters.solvers import SCHEMES
 from flipproof.chapters.waterfall.chapter import figure_waterfall
 from flipproof.chapters.waterfall.study import PROGRAM, Waterfall, plan_waterfall, split_all
 from flipproof.figures.style import draw
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.solvers import Run
 from flipproof.frame.store import Store
-from flipproof.output.columns import rows_csv
 from flipproof.output.files import write_whole
 from flipproof.sweep.axes import FILL
 from flipproof.sweep.command import Begin, completed

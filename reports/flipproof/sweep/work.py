@@ -18,9 +18,9 @@ import numpy as np
 
 from flipproof.foreign.specs import content_of
 from flipproof.frame.keys import changed_since_import, fingerprint, versions_of
+from flipproof.frame.provenance import provenance, version_of
 from flipproof.frame.solvers import find, solve
 from flipproof.frame.store import json_of
-from flipproof.output.provenance import provenance, version_of
 from flipproof.sweep.errors import SweepError
 from ode_reference.solver import WATERS
 from slicemodel.observables import centre_of_mass_velocity, plateau

@@ -10,7 +10,7 @@ from flipproof import chapters
 from flipproof.build import ask_of, build, gather_report, write
 from flipproof.check.throw import check, groups
 from flipproof.frame.pool import SerialExecutor
-from flipproof.output.provenance import provenance
+from flipproof.frame.provenance import provenance
 from slicemodel import Scenario
 
 HOWTO = resources.files("flipproof").joinpath("..", "..", "docs", "howto.md")

@@ -24,8 +24,8 @@ from flipproof.curves.events import IndexArray, closest
 from flipproof.curves.tube import Held, hold
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, observed, results_of
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.solvers import Missing
-from flipproof.output.columns import rows_csv
 from slicemodel import Trajectory
 from slicemodel.trajectory import BASE, CAP, FloatArray
 

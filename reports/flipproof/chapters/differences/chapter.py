@@ -32,12 +32,12 @@ from flipproof.frame.chapter import (
     observed,
     regression,
 )
+from flipproof.frame.columns import curves_csv
 from flipproof.frame.equations import NAMES
 from flipproof.frame.findings import Rule
 from flipproof.frame.flights import Flights, attempt, results_of
 from flipproof.frame.solvers import finer
 from flipproof.frame.twins import BAND_WORDS, omega_band_call
-from flipproof.output.columns import curves_csv
 from ode_reference.models import LADDER, MODELS, ladder_of
 from ode_reference.motion import Model
 from slicemodel import Trajectory

@@ -21,9 +21,9 @@ from flipproof.chapters.solvers import ENGINE
 from flipproof.curves.ensemble import claim_change, largest_change
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Run, RunResult, Study, judged
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.findings import finite_or_none, regression
 from flipproof.frame.solvers import Missing, without_gravity
-from flipproof.output.columns import rows_csv
 from slicemodel import Scenario, Trajectory
 
 FEW_ITERATIONS: Final = 10

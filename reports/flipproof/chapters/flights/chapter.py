@@ -14,8 +14,8 @@ from engine_check.engines import ENGINES
 from flipproof.chapters.solvers import FLIGHTS, LIMITS, OTHER_SOLVERS, SCHEMES, Guest
 from flipproof.figures.style import new_figure, shared_legend, shown_name, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, RunResult, Study, Touch
+from flipproof.frame.columns import curves_csv, json_ready
 from flipproof.frame.solvers import find
-from flipproof.output.columns import curves_csv, json_ready
 from flipproof.output.motion import motion_data
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Scenario, Trajectory

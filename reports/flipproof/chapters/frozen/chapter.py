@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study
-from flipproof.output.columns import TIME, columns_csv
+from flipproof.frame.columns import TIME, columns_csv
 from slicemodel import Trajectory
 from slicemodel.observables import centre_of_mass, centre_of_mass_velocity, moment_of_inertia
 from slicemodel.trajectory import FloatArray

@@ -14,8 +14,8 @@ from flipproof.chapters.waterfall.chapter import bars_csv, figure_waterfall
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, styled
 from flipproof.foreign.certify import findings_of
 from flipproof.frame.chapter import Absent, Band, Chapter, Claims, Exhibit, observed, regression
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.equations import NAMES
-from flipproof.output.columns import rows_csv
 
 FLOOR: Final = 1e-12
 """Least error that is drawn [omega_0]."""

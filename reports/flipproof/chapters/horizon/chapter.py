@@ -28,9 +28,9 @@ from flipproof.chapters.solvers import ENGINE, FREE
 from flipproof.curves.ensemble import Ensemble
 from flipproof.figures.style import new_figure, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression
+from flipproof.frame.columns import curves_csv
 from flipproof.frame.flights import Flights, attempt
 from flipproof.frame.solvers import Run, find
-from flipproof.output.columns import curves_csv
 from slicemodel import Scenario
 
 Kind = Literal["angle", "release", "order"]

@@ -27,7 +27,7 @@ from flipproof.frame.chapter import (
     observed,
     regression,
 )
-from flipproof.output.columns import curves_csv
+from flipproof.frame.columns import curves_csv
 from slicemodel import Trajectory
 from slicemodel.trajectory import FloatArray
 

@@ -18,8 +18,8 @@ from matplotlib.patches import Patch
 from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Kind, LandingStudy
 from flipproof.chapters.landing.throws import FAMILIES
 from flipproof.figures.style import new_figure, shared_legend, styled
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.exhibit import Exhibit
-from flipproof.output.columns import rows_csv
 
 LOOKS: Final[Mapping[Kind, dict[str, Any]]] = {
     "together": {"color": "#0072B2", "marker": "o", "linestyle": "-"},

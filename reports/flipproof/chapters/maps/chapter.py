@@ -34,8 +34,8 @@ from flipproof.chapters.maps.study import (
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt, results_of
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.twins import BAND_WORDS
-from flipproof.output.columns import rows_csv
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 

@@ -18,7 +18,7 @@ from flipproof.chapters.ice.chapter import measure
 from flipproof.chapters.maps.study import vary
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Run, RunResult, Study, observed, regression
-from flipproof.output.columns import columns_csv
+from flipproof.frame.columns import columns_csv
 from ode_reference.solver import COLUMN, RODS
 from slicemodel import Scenario, Trajectory
 from slicemodel.observables import plateau

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from flipproof.chapters.solvers import SCHEMES
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Chapter, Exhibit, Run, Study, attempt, results_of
-from flipproof.output.columns import curves_csv
+from flipproof.frame.columns import curves_csv
 from slicemodel import Trajectory
 
 

@@ -24,10 +24,10 @@ from flipproof.chapters.maps.study import vary
 from flipproof.curves.ensemble import largest_change
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Exhibit, Finding, Study, attempt, observed, regression
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.flights import Flights
 from flipproof.frame.solvers import Run, RunResult
 from flipproof.frame.twins import omega_band_call
-from flipproof.output.columns import rows_csv
 from slicemodel import Scenario, Trajectory
 from slicemodel.scenario import shortened
 

@@ -34,9 +34,9 @@ from flipproof.frame.chapter import (
     observed,
     regression,
 )
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.flights import Flights, Outcome, attempt, results_of
 from flipproof.frame.solvers import Missing, Run
-from flipproof.output.columns import rows_csv
 from slicemodel import Scenario, Trajectory
 from slicemodel.trajectory import FloatArray
 

@@ -27,7 +27,7 @@ from flipproof.chapters.water.study import (
 )
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Chapter, Claims, Exhibit, observed
-from flipproof.output.columns import columns_csv
+from flipproof.frame.columns import columns_csv
 from ode_reference.solver import COLUMN, RODS
 from slicemodel.trajectory import FloatArray
 

@@ -18,8 +18,8 @@ from flipproof.chapters.waterfall.study import (
 )
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.chapter import Ask, Band, Call, Chapter, Claims, Exhibit, Finding, Study, observed
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.solvers import FINER
-from flipproof.output.columns import rows_csv
 
 CHUNK: Final = 16
 """Runs that a worker makes at a time; it returns what was observed alone."""

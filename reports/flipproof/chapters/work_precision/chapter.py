@@ -11,9 +11,9 @@ from flipproof.chapters.work_precision.contenders import FULL, THROW, common_tim
 from flipproof.chapters.work_precision.figure import figure_work_precision
 from flipproof.chapters.work_precision.study import Cost, Curve, Price, WorkPrecision, study_work_precision
 from flipproof.frame.chapter import Ask, Band, Call, Chapter, Exhibit, Finding, Study, observed
+from flipproof.frame.columns import rows_csv
 from flipproof.frame.findings import finite_or_none
 from flipproof.frame.timing import batches, make_timed
-from flipproof.output.columns import rows_csv
 from slicemodel.scenario import shortened
 
 NAME: Final = "impacts"
