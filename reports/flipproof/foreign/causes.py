@@ -122,7 +122,10 @@ def _restitution_cause(intervals: Sequence[Interval]) -> str:
     wrong = [e for e in narrow if abs(np.median(measured[e]) - e) > max(0.003 * e, 2.0 * float(np.ptp(ends[e])))]
     if not wrong:
         return "look at how the time of an impact is found: the slice that strikes leaves with the right e"
-    e_text = " and ".join(f"{np.median(measured[e]):.3g} where it is {e:.3g}" for e in wrong)
+    medians = {e: float(np.median(measured[e])) for e in wrong}
+    e_text = " and ".join(
+        f"{m:.{3 if f'{m:.2g}' == f'{e:.2g}' else 2}g} where it is {e:.3g}" for e, m in medians.items()
+    )
     return f"the slice that strikes leaves as if e were {e_text}"
 
 
