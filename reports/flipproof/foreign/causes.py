@@ -77,7 +77,7 @@ def _impact_cause(intervals: Sequence[Interval], *, recoil: bool) -> str:
     single = [i for i in intervals if len(i.hits) == 1]
     if not single:
         return ""
-    delays = [_delay(i, i.hits[0][0]) for i in single]
+    delays = [delay(i, i.hits[0][0]) for i in single]
     if np.mean(np.isfinite(delays)) > 0.6:
         extent = f"{np.nanmax(np.abs(delays)):.1g} s"
         if np.nanmedian(delays) < 0.0:
@@ -135,7 +135,7 @@ def _off_ends(interval: Interval) -> bool:
     return bool(np.any((interval.r[0] > throw.r_min + room) & (interval.r[0] < throw.r_max - room)))
 
 
-def _delay(interval: Interval, index: int) -> float:
+def delay(interval: Interval, index: int) -> float:
     """Return how late a slice leaves the end that it strikes [s], negative if early; NaN if its speed is off."""
     speed, errors = interval.expected["v"][index], interval.v[1] - interval.expected["v"]
     offset = interval.r[1][index] - interval.expected["r"][index]

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.foreign.causes import cause_of, rms
+from flipproof.foreign.causes import cause_of, delay, rms
 from flipproof.foreign.checking import NotApplicableError, effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.interval import FLOOR, Interval, intervals_of
@@ -228,10 +228,8 @@ def _spoiled(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval
     if (traits.order or 0.0) < 2.0 or min(map(len, lone)) < 2 * FEW:
         return "", ""
     coarse_size, fine_size = (float(np.median([interval.size for interval in intervals])) for intervals in lone)
-    late_share = np.mean(
-        [(i.expected["r"] - i.r[1])[i.hits[0][0]] * i.expected["v"][i.hits[0][0]] > 0.0 for i in lone[1]]
-    )
-    if fine_size < SPOILED or coarse_size > 6 * fine_size or late_share > SURE:
+    late_share = np.mean([delay(i, i.hits[0][0]) > 0.0 for i in lone[1]])
+    if fine_size < SPOILED or coarse_size > 6 * fine_size or late_share > 0.5:
         return "", ""
     return (
         f"at impacts that come alone, by {coarse_size:.1g} of a field's scale (median of {len(lone[0])}) and by "
