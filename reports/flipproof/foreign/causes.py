@@ -102,6 +102,8 @@ def _impact_cause(intervals: Sequence[Interval], *, recoil: bool) -> str:
     )
     if alike.size and alike.mean() > 0.8:
         return "all slices' speeds are off by the same: look at the recoil of the tube"
+    if "as if e were" in (cause := _restitution_cause(single)):
+        return f"{cause}, and the others follow by the recoil of the tube"
     return "the slice that strikes and the others are off: look at the recoil of the tube"
 
 

@@ -311,7 +311,10 @@ def _rate_advice(rates: FloatArray) -> str:
     excess = float(np.median(rates)) - 1.0
     if abs(excess) < 1e-9 or float(np.ptp(rates)) > 1e-3 * abs(excess):
         return ""
-    return f"theta advances by {1.0 + excess:.6g} omega dt in every step: look for weights that do not add up to 1"
+    return (
+        f"theta advances by {1.0 + excess:.6g} omega dt in every step: look for weights that do not add up to 1, or at "
+        "the inertia by which theta is advanced"
+    )
 
 
 def check_angle(traits: Traits) -> CheckGenerator:
@@ -342,8 +345,7 @@ def check_angle(traits: Traits) -> CheckGenerator:
             expected="the same theta, whatever other times are asked",
             observed=f"theta = {slow_end.theta[-1]:.4g} rad instead of {slow.theta[-1]:.4g} rad",
             where=f"flight of {SLOW.duration:g} s, asked at its end alone instead of at 961 times",
-            advice="fly from one of ask.times to the next, however far apart they are: look for a largest number of "
-            "steps, or what is done once between two of them",
+            advice=_end_advice(slow_ask, slow_end.theta[-1] - slow.theta[-1], slow_end.theta[-1]),
         )
     return Observation(
         holds=holds and not stops,
@@ -357,6 +359,19 @@ def check_angle(traits: Traits) -> CheckGenerator:
         else f"{hint}theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a "
         "step with an impact; or the omega answered is not the one by which theta advances",
         facts={"angle": sizes},
+    )
+
+
+def _end_advice(ask: Ask, difference: float, theta: float) -> str:
+    """Return what to look at if theta [rad] at the end of a flight differs where that is the only time asked."""
+    turns = difference / (2 * np.pi)
+    if theta == ask.scenario.theta0:
+        return "theta is still theta_0: the flight begins at t = 0, not at the first of ask.times"
+    if abs(turns - round(turns)) < 1e-3:
+        return "theta is off by whole turns: count them in every step, not from one of ask.times to the next"
+    return (
+        "fly from one of ask.times to the next, however far apart they are: look for a largest number of steps, or "
+        "what is done once between two of them"
     )
 
 

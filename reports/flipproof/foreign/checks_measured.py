@@ -352,8 +352,9 @@ PIECES: Final = (
     replace(elsewhere.STICKY, slices=5),
     replace(elsewhere.RESTLESS, slices=5),
     replace(elsewhere.WHOLE, gravity=0.0, damping=0.0, angle=5.0),
+    elsewhere.HELD,
 )
-"""Throws with and without weight, drag, and rests on both ends, of an even and an odd number of slices."""
+"""Throws with and without weight, drag, and rests on one or both ends, of an even and an odd number of slices."""
 
 
 def check_piecewise(traits: Traits) -> CheckGenerator:

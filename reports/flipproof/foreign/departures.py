@@ -172,8 +172,12 @@ def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureG
             departs = _departs(traits, intervals, coarse)
             if departs.sum() < FEW:
                 return spoiled
+        ignored = bool(coarse) and [i.size for i in coarse] == [i.size for i in intervals]
         coarse = intervals
-    return _describe(equation, intervals, departs)
+    where, advice = _describe(equation, intervals, departs)
+    if ignored and not advice:
+        advice = f"another {traits.refined_by} changes nothing: look at how ask.effort is used"
+    return where, advice
 
 
 def _intervals_at(

@@ -716,6 +716,19 @@ STICKY: Final = replace(WHOLE, restitution=0.05, omega0=8.0)
 """A throw in which slices rest on either end, and weight releases them."""
 
 
+HELD: Final = replace(
+    PAPER,
+    slices=5,
+    start="partly on the ends",
+    restitution=0.3,
+    damping=1.0,
+    gravity=9.0,
+    omega0=8.0,
+    angle=13.0,
+)
+"""One that begins with slices on both ends, and lets them go from both."""
+
+
 def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNREFINED) -> TextGenerator:
     """Return which of weight, drag, impacts or rests must be left out to be right, if any, and what to look at."""
     for whole in (WHOLE, STICKY):

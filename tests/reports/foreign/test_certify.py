@@ -11,6 +11,7 @@ from planted import InProcess, patches
 from planted.asked import ASKED
 from planted.ours import MISTAKES
 from planted.subject import Subject
+from power import LISTS
 
 import ode_reference
 from flipproof.foreign import checks_measured
@@ -589,7 +590,7 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
     ],
 )
 def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    solver = (patches("first") | patches("second") | patches("fifth"))[mistake].solver()
+    solver = next(mistakes[mistake] for mistakes in LISTS.values() if mistake in mistakes).solver()
     found = certify(InProcess(solver, mistake), until_failed=True)
     assert [r.check for r in found.failed] == [check]
     assert advice in found.results[-1].line
@@ -626,6 +627,10 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("object_answers_along_the_tangent", "piecewise", "must know of an impact on its way"),
         ("adams_not_begun_again", "piecewise", "look at the rest of a step with an impact, and what is kept over it"),
         ("taylor8_last_eighth", "piecewise", "look at where in a step they are searched for"),
+        ("taylor_2_last_to_let_go", "piecewise", "look at when a slice at rest is let go"),
+        ("ssp3_located_speed_before_the_step", "piecewise", "steps without an impact have a higher order"),
+        ("unit_vector_unwraps_between_outputs", "angle", "theta is off by whole turns"),
+        ("spins_one_way_released_at_first_output", "angle", "the flight begins at t = 0, not at the first"),
         ("remembered_in_any_order", "inputs", "with another order of the start"),
         ("spin_only_thousand_steps", "angle", "look for a largest number of steps"),
         ("midpoint_stale_inertia", "definitions", "it is that of the output before"),
@@ -647,8 +652,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
     ],
 )
 def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    lists = ("first", "second", "fourth", "fifth", "seventh", "eighth", "ninth", "eleventh", "twelfth", "thirteenth")
-    solver = next(each[mistake] for each in map(patches, lists) if mistake in each).solver()
+    solver = next(mistakes[mistake] for mistakes in LISTS.values() if mistake in mistakes).solver()
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
     assert advice in result.line
