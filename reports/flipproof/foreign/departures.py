@@ -232,14 +232,16 @@ def _spoiled(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval
     if (traits.order or 0.0) < 2.0 or min(map(len, lone)) < 2 * FEW:
         return "", ""
     coarse_size, fine_size = (float(np.median([interval.size for interval in intervals])) for intervals in lone)
-    late_share = np.mean([delay(i, i.hits[0][0]) > 0.0 for i in lone[1]])
-    if fine_size < SPOILED or coarse_size > 6 * fine_size or late_share > 0.5:
+    delays = np.array([delay(i, i.hits[0][0]) for i in lone[1]])
+    if fine_size < SPOILED or coarse_size > 6 * fine_size or np.mean(delays > 0.0) > 0.5:
         return "", ""
+    advice = "look at the instant of the speed with which a slice strikes, and at the rest of the step after the impact"
+    if np.mean(delays < 0.0) > 0.5:
+        advice = "slices are ahead: look at the rest of a step with an impact, and what is kept over it"
     return (
         f"at impacts that come alone, by {coarse_size:.1g} of a field's scale (median of {len(lone[0])}) and by "
         f"{fine_size:.1g} at a quarter of the step",
-        "steps without an impact have a higher order: look at the instant of the speed with which a slice strikes, "
-        "and at the rest of the step after the impact",
+        f"steps without an impact have a higher order: {advice}",
     )
 
 
