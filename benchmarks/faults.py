@@ -105,7 +105,7 @@ FAULTS = (
      "test_sweep.py"),
     ("reports/flipproof/check/diff.py", "return sum(_bands(*findings))",
      "return max(_bands(*findings), default=0.0)", "test_diff.py"),
-    ("reports/flipproof/foreign/checks_measured.py", "if holds := orders[worst] >= least:",
+    ("reports/flipproof/foreign/checks_measured.py", "if holds := orders[worst] >= required:",
      "if holds := orders[worst] <= declared + ORDER_ROOM:", "foreign/test_certify.py"),
     ("reports/flipproof/foreign/departures.py", "count < FEW or np.median(sizes) > EXACT", "count < 99",
      "foreign/test_certify.py"),

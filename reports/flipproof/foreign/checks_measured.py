@@ -164,11 +164,11 @@ def check_order_before(traits: Traits) -> CheckGenerator:
     orders = _orders(traits, changes)
     if not orders:
         raise NotApplicableError(f"changes under refinement are round-off, {max(changes['omega']):.2g} of omega_0")
-    least = declared - ORDER_ROOM
+    required = declared - ORDER_ROOM
     worst = min(orders, key=lambda name: orders[name])
     where = f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves"
     observed, advice = f"{orders[worst]:.2f} ({worst})", ""
-    if holds := orders[worst] >= least:
+    if holds := orders[worst] >= required:
         uneven_changes = yield from _changes_before(traits, SMOOTH, levels, uneven=True)
         # Output times shorten steps, so that a right answer changes less; where something else limits the step, only
         # they change it, and such levels do not count.
@@ -178,7 +178,7 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         }
         uneven = _orders(traits, counted)
         worst_uneven = min(uneven, key=lambda name: uneven[name], default="")
-        if worst_uneven and uneven[worst_uneven] < least:
+        if worst_uneven and uneven[worst_uneven] < required:
             holds = False
             observed = (
                 f"{uneven[worst_uneven]:.2f} ({worst_uneven}) where output times cut steps unevenly, else {observed}"
@@ -190,10 +190,10 @@ def check_order_before(traits: Traits) -> CheckGenerator:
     else:
         for name, throw in CALM.items():
             orders_without = _orders(traits, (yield from _changes_before(traits, throw, levels)))
-            if orders_without and min(orders_without.values()) >= least:
+            if orders_without and min(orders_without.values()) >= required:
                 advice = f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}"
                 break
-    low, right = ([name for name, order in orders.items() if (order < least) == below] for below in (True, False))
+    low, right = ([name for name, order in orders.items() if (order < required) == below] for below in (True, False))
     if low and right:
         default_advice = (
             f"{', '.join(right)} of that order: look at how {' and '.join(low)} is advanced in a step, and answered"
@@ -223,7 +223,7 @@ def _changes_before(
     asks = [ask_of(traits, throw, level, points=3) for level in levels]
     if uneven:
         asks = [
-            replace(ask, times=np.union1d(common, _uneven_times(throw.duration, 800.0 * 2.0**level)))
+            replace(ask, times=np.union1d(common, _uneven_times(throw.duration, 960.0 / 1.2 * 2.0**level)))
             for ask, level in zip(asks, levels, strict=True)
         ]
     answers = yield asks
