@@ -212,8 +212,8 @@ class Assessment:
         jumps = moves[:, 1:-1] - (moves[:, :-2] + moves[:, 2:]) / 2  # 0 for what moves steadily
         size = np.hypot(*jumps.mean(axis=0).T)
         alike = np.hypot(*(jumps[0] - jumps[1]).T) < 0.3 * size
-        # A frame that is clicked elsewhere, and returns, changes the move after it, too.
-        alike &= np.hypot(*(moves[:, 2:] - moves[:, :-2]).mean(axis=0).T) < 0.5 * size
+        # An end that is clicked elsewhere, and returns, changes the move after it, too.
+        alike &= np.linalg.norm(moves[:, 2:] - moves[:, :-2], axis=2).max(axis=0) < 0.5 * size
         even = np.abs(steps[1:-1] - (steps[:-2] + steps[2:]) / 2) < 0.1 * steps[1:-1]
         before_touch = film.t[3:] < estimate.likelihood.touch
         sizes = np.where(alike & even & before_touch, size, 0.0)

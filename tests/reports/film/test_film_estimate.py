@@ -292,6 +292,14 @@ def test_an_origin_that_moves_is_refused_and_one_frame_clicked_elsewhere_is_not(
         moved._check_origin()
 
 
+def test_a_bad_click_of_each_end_in_two_frames_is_no_jump_of_the_origin(quick):
+    one = quick[1].estimate
+    values = one.film.values.copy()
+    values[0, 5, 0] += 0.15
+    values[1, 6, 0] -= 0.15
+    Assessment(replace(one, film=replace(one.film, values=values)))._check_origin()
+
+
 @pytest.mark.parametrize("which", ["poor", "eq8"])
 def test_exchanged_ends_are_refused_whatever_flight_is_found_in_them(request, which):
     """The search would leave the beginning to the hand, and find a late release with a spin far too slow."""
