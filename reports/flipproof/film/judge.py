@@ -37,7 +37,7 @@ EXCHANGED: Final = 20.0
 JUMP: Final = 0.35
 """Jump of both ends from one frame to the next, fraction of the bottle's length, that no hand makes.
 
-Hands of simulated films leave 0.07 at the most.
+In 5400 simulated films hands and bad clicks leave 0.08 at the most.
 """
 
 SHOWN: Final = ("gamma", "restitution", "omega0", "theta0", "release", "touch", "tilt", "g", "noise", "length")
