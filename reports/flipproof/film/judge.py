@@ -210,15 +210,15 @@ class Assessment:
         estimate, film = self.estimate, self.estimate.film
         steps, moves = np.diff(film.t), np.diff(film.values, axis=1)
         jumps = moves[:, 1:-1] - (moves[:, :-2] + moves[:, 2:]) / 2  # 0 for what moves steadily
-        size = np.hypot(*jumps.mean(axis=0).T)
-        alike = np.hypot(*(jumps[0] - jumps[1]).T) < 0.3 * size
+        size = np.linalg.norm(jumps.mean(axis=0), axis=1)
+        alike = np.linalg.norm(jumps[0] - jumps[1], axis=1) < 0.3 * size
         # An end that is clicked elsewhere, and returns, changes the move after it, too.
         alike &= np.linalg.norm(moves[:, 2:] - moves[:, :-2], axis=2).max(axis=0) < 0.5 * size
         even = np.abs(steps[1:-1] - (steps[:-2] + steps[2:]) / 2) < 0.1 * steps[1:-1]
         before_touch = film.t[3:] < estimate.likelihood.touch
         sizes = np.where(alike & even & before_touch, size, 0.0)
-        k = int(np.argmax(sizes)) if len(sizes) else 0
-        if len(sizes) and sizes[k] > JUMP * estimate.best["length"]:
+        k = int(np.argmax(sizes))
+        if sizes[k] > JUMP * estimate.best["length"]:
             raise UnsoundError(
                 f"{film.label}: both ends jump by {sizes[k]:.2g} m from {film.t[k + 1]:.3f} to {film.t[k + 2]:.3f} s: "
                 "click one clip, with one origin in all of its frames"

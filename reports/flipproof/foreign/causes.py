@@ -102,8 +102,6 @@ def _impact_cause(intervals: Sequence[Interval], *, recoil: bool) -> str:
     )
     if alike.size and alike.mean() > 0.8:
         return "all slices' speeds are off by the same: look at the recoil of the tube"
-    if "as if e were" in (cause := _restitution_cause(single)):
-        return f"{cause}, and the others follow by the recoil of the tube"
     return "the slice that strikes and the others are off: look at the recoil of the tube"
 
 
@@ -124,11 +122,12 @@ def _restitution_cause(intervals: Sequence[Interval]) -> str:
     wrong = [e for e in narrow if abs(np.median(measured[e]) - e) > max(0.003 * e, 2.0 * float(np.ptp(ends[e])))]
     if not wrong:
         return "look at how the time of an impact is found: the slice that strikes leaves with the right e"
-    medians = {e: float(np.median(measured[e])) for e in wrong}
-    e_text = " and ".join(
-        f"{m:.{3 if f'{m:.2g}' == f'{e:.2g}' else 2}g} where it is {e:.3g}" for e, m in medians.items()
-    )
-    return f"the slice that strikes leaves as if e were {e_text}"
+    texts = []
+    for e in wrong:
+        median = float(np.median(measured[e]))
+        digits = 3 if f"{median:.2g}" == f"{e:.2g}" else 2
+        texts.append(f"{median:.{digits}g} where it is {e:.3g}")
+    return f"the slice that strikes leaves as if e were {' and '.join(texts)}"
 
 
 def _off_ends(interval: Interval) -> bool:

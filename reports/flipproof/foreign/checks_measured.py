@@ -136,13 +136,12 @@ def _error(traits: Traits, answer: Answer) -> Generator[Sequence[Ask], Sequence[
 
 def _change(coarse: Answer, fine: Answer) -> float:
     """Return the largest difference of omega and theta, each as a fraction of its scale."""
-    return max(shift(coarse, fine, THROW.omega0), _field_difference(coarse, fine, "theta"))
+    return max(shift(coarse, fine, THROW.omega0), _difference(coarse.theta, fine.theta))
 
 
-def _field_difference(coarse: Answer, fine: Answer, name: str) -> float:
-    """Return the largest difference of a field, fraction of its largest value."""
-    a, b = getattr(coarse, name), getattr(fine, name)
-    return float(np.max(np.abs(a - b)) / max(float(np.max(np.abs(b))), 1e-300))
+def _difference(coarse: FloatArray, fine: FloatArray) -> float:
+    """Return the largest difference of a field's values, fraction of the largest of them."""
+    return float(np.max(np.abs(coarse - fine)) / max(float(np.max(np.abs(fine))), 1e-300))
 
 
 def _order_of(traits: Traits) -> float:
@@ -231,9 +230,7 @@ def _changes_before(
     for name in FIELDS:
         if getattr(answers[0], name) is not None:
             values = [getattr(answer, name)[np.searchsorted(answer.t, common)] for answer in answers]
-            changes[name] = [
-                float(np.max(np.abs(a - b)) / max(float(np.max(np.abs(b))), 1e-300)) for a, b in pairwise(values)
-            ]
+            changes[name] = [_difference(a, b) for a, b in pairwise(values)]
     return changes
 
 

@@ -583,6 +583,10 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("tolerance_of_the_module", "refinement", "or declare no refined_by"),
         ("adaptive_leaves_off_just_before_answer", "velocity", "theta stands still between two of the times asked"),
         ("fixed_omega_from_differences", "start", "not a slope of theta"),
+        ("rest_of_step_lost", "angle", "over the rest of a step"),
+        ("adaptive_cap_rebound_put_on_base", "piecewise", "with an impact on the cap, in none of"),
+        ("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating"),
+        ("halving_drag_of_momentum", "piecewise", "x the drag alpha v_CM / m besides"),
         ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
         pytest.param(
             "halving_released_level", "mirror", "right without weight: look at the weight", marks=pytest.mark.slow
@@ -599,9 +603,6 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
 @pytest.mark.parametrize(
     ("mistake", "check", "advice"),
     [
-        ("rest_of_step_lost", "angle", "over the rest of a step"),
-        ("adaptive_cap_rebound_put_on_base", "piecewise", "with an impact on the cap, in none of"),
-        ("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating"),
         ("answers_cached_without_start", "inputs", "keep no answer under a part of the question"),
         ("remembered_by_the_mean_of_the_start", "inputs", "with another start of the same mean"),
         ("closed_form_momentum_remembered", "start", "compute J_0 from ask.start"),
@@ -642,7 +643,6 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
                 ("slices_at_least_a_millimetre", "elsewhere", "look for a constant in m, kg, kg/s"),
                 ("reduced_free_slow_spin_not_scaled", "elsewhere", "look for a constant in rad/s"),
                 ("only_what_moves_is_struck", "restitution", "look at e at the cap, and at the slices that rest"),
-                ("halving_drag_of_momentum", "piecewise", "x the drag alpha v_CM / m besides"),
                 ("ice_gathers_speed", "elsewhere", "its v is 0 and stays 0"),
                 ("first_found_is_first", "elsewhere", "of several in a step the earliest"),
                 ("nearly_full_is_ice", "elsewhere", "look for a least room, or for water that is taken for ice"),
