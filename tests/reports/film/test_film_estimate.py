@@ -280,7 +280,7 @@ def test_an_estimate_that_begins_in_free_flight_is_refused(quick):
         (-0.5, slice(9, None), True),
         (0.03, slice(4, None), False),
         (0.5, 4, False),
-        (np.linspace(0.0, 20.0, 400), slice(None), False),  # fast, but steady
+        (np.linspace(0.0, 80.0, 400), slice(None), False),  # 0.2 m a frame, but steady
     ],
 )
 def test_an_origin_that_moves_is_refused_and_one_frame_clicked_elsewhere_is_not(quick, shift, frames, refused):
