@@ -3,7 +3,8 @@
     python benchmarks/films.py [--films 20] [--first 0] [--slices 6]      coverage, one line a cell
     python benchmarks/films.py --spoiled 500 --noise 200                  spoiled and random films: no traceback
     python benchmarks/films.py --late 20                                  late releases, seen without an equation
-    python benchmarks/films.py --given 5          widths of intervals, over those with the true release given
+    python benchmarks/films.py --given 5          widths of intervals, over those with the true release given, and
+                                                  the same ratio for the Cramer-Rao bounds of the flight alone
 
 Frames per second and noise of a click, three levels each, are crossed; tilt, bad clicks, missing points and filling run
 through their levels by an orthogonal fraction of 18 cells.
@@ -12,10 +13,12 @@ through their levels by an orthogonal fraction of 18 cells.
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import time
 import traceback
 from collections import Counter
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -24,10 +27,11 @@ import film_simulator
 import numpy as np
 from scipy.stats import beta
 
-from flipproof.film.estimate import estimate
+from flipproof.film.curves import Equation
+from flipproof.film.estimate import estimate, fit_place
 from flipproof.film.fall import hand_share
 from flipproof.film.judge import Assessment
-from flipproof.film.likelihood import Film, Held
+from flipproof.film.likelihood import Film, Held, Likelihood
 from slicemodel import Scenario
 
 NAMES = ("gamma", "omega0", "release", "tilt", "restitution")
@@ -122,12 +126,15 @@ def rough(spoiled: int, noise: int, slices: int) -> None:
 
 
 def widths(films: int, first: int, slices: int) -> None:
-    """Print by cell how wide intervals are, over those with the true release given: median, largest, number."""
+    """Print by cell how wide intervals are, over those with the true release given: median, largest, number, bound."""
     for index, cell in enumerate(cells()):
         ratios: dict[str, list[float]] = {name: [] for name in NAMES if name != "release"}
+        bounds: dict[str, list[float]] = {"gamma": [], "omega0": []}
         for k in range(first, first + films):
             made = drawn(np.random.default_rng([index, k]), cell, slices)
             film, throw = film_of(made), Scenario(water_mass=cell["filling"]).with_slices(slices)
+            for name, ratio in zip(bounds, information_ratios(made, throw), strict=True):
+                bounds[name].append(ratio)
             try:
                 alone = Assessment(estimate(film, throw))
                 given = Assessment(estimate(film, throw, held=Held(release=made.truth["release"])))
@@ -140,7 +147,44 @@ def widths(films: int, first: int, slices: int) -> None:
                     wide, narrow = (float(np.ptp(one.estimate.interval(name))) for one in (alone, given))
                     found.append(wide / narrow)
         words = [f"{name} {np.median(v):.2f}, {max(v):.2f} of {len(v)}" for name, v in ratios.items() if v]
+        words += [f"bound of {name} {np.median(v):.2f}, {max(v):.2f}" for name, v in bounds.items()]
         print(*cell.values(), "|", "; ".join(words), flush=True)
+
+
+def information_ratios(made: film_simulator.Clip, throw: Scenario) -> tuple[float, float]:
+    """Return by how much not to know the release widens the Cramer-Rao bounds of gamma and omega_0.
+
+    The data are the clicks in flight, bad ones as well; e has the variance of a uniform prior.
+    """
+    truth, change = made.truth, 1e-3
+    rate, e, omega0 = truth["gamma"] / truth["omega0"], truth["restitution"], truth["omega0"]
+    nodes = [(rate, e), (rate * (1 + change), e), (rate * (1 - change), e), (rate, e + change), (rate, e - change)]
+    curves = [
+        curve
+        for curve in Equation("free-flight", throw, 30.0).curves(np.array(nodes), omega0, truth["theta0"])
+        if curve
+    ]
+    spin = np.array([truth["release"], truth["theta0"] + np.radians(truth["tilt"]), omega0])
+    film = film_of(made)
+    x, _ = fit_place(film, curves[0], spin, truth["touch"], throw.bottle.length)
+    flying = (film.t >= truth["release"]) & (film.t <= truth["touch"])
+    flight = replace(film, t=film.t[flying], values=film.values[:, flying], lines=film.lines[flying])
+    likelihood = Likelihood(flight, Held(), truth["touch"], truth["noise"])
+    values = [likelihood.model(curve, x)[0] for curve in curves]
+    outer = [(values[1] - values[2]) / (2 * change * rate), (values[3] - values[4]) / (2 * change)]
+    slopes = np.concatenate((likelihood.model(curves[0], x)[1][..., :10], np.stack(outer, axis=-1)), axis=-1)
+    design = slopes[flight.clicked].reshape(-1, 12) / truth["noise"]
+    information = design.T @ design
+    information[11, 11] += 12.0
+    gradients = np.zeros((2, 12))
+    gradients[0, [2, 10]], gradients[1, 2] = (rate, omega0), 1.0
+    scale = np.sqrt(np.diag(information))
+    unknown, given = (
+        np.linalg.pinv((information / np.outer(scale, scale))[first:, first:], rcond=1e-13) for first in (0, 1)
+    )
+    scaled = gradients / scale
+    ratios = [math.sqrt((row @ unknown @ row) / (row[1:] @ given @ row[1:])) for row in scaled]
+    return ratios[0], ratios[1]
 
 
 def releases(films: int) -> None:

@@ -595,7 +595,7 @@ def _first_guesses(film: Film, throw: Scenario, held: Held) -> list[tuple[float,
         touches = [times[k] + q * (end - times[k]) for q in TOUCH_SHARES] if held.touch is None else [held.touch]
         beginnings = []
         for touch in touches:
-            x, noise = _fit_place(film, curve, spin, touch, length)
+            x, noise = fit_place(film, curve, spin, touch, length)
             likelihood = Likelihood(film, held, touch, max(noise, 1e-5))
             beginnings.append((likelihood.terms(curve, x)[0] + _implausibility_cost(film, x), likelihood, x))
         beginnings.sort(key=lambda guess: guess[0])
@@ -650,7 +650,7 @@ def _initial_rate(t: FloatArray, angle: FloatArray, window: int) -> float:
     return float(np.median((angles[lag:] - angles[:-lag]) / (times[lag:] - times[:-lag]))) if len(angles) > lag else 0.0
 
 
-def _fit_place(film: Film, curve: Curve, spin: FloatArray, end: float, length: float) -> tuple[FloatArray, float]:
+def fit_place(film: Film, curve: Curve, spin: FloatArray, end: float, length: float) -> tuple[FloatArray, float]:
     """Return all inner parameters for a given spin, a robust linear fit of the place up to ``end``, and the noise."""
     in_flight = (film.t >= spin[0] - 1e-9) & (film.t <= end + 1e-9)
     flight = replace(film, t=film.t[in_flight], values=film.values[:, in_flight], lines=film.lines[in_flight])
