@@ -15,6 +15,7 @@ paper's throw or back to it, until one of them separates right from wrong.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -24,6 +25,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 import ode_reference
 from flipproof.foreign.checking import THROW, CheckGenerator, NotApplicableError, Observation, effort_of
@@ -764,7 +766,35 @@ def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNRE
     (centred,) = yield from comparing(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
     if not centred.wrong:
         return f"{text}, but right with every slice far from the ends: look at the places of the ends, and at rests; "
+    factor = yield from _as_if(traits, simpler["all"], equation)
+    if factor:
+        return f"{text}: as if {factor}; "
     return f"{text}: look at the centrifugal term omega^2 (r - r_cm), the inertia and the masses; "
+
+
+def _as_if(traits: Traits, knobs: Knobs, equation: str) -> TextGenerator:
+    """Return with what other mass or own inertia of the bottle an answer before the first impact goes; or empty."""
+    ask = knobs.ask(0)
+    (answer,) = yield [replace(ask, effort=effort_of(traits, ask.scenario, LEVELS[1][0]))]
+
+    def distance(log_factor: float, name: str) -> float:
+        altered = replace(knobs, **{name: getattr(knobs, name) * math.exp(log_factor)}).ask(0).scenario
+        flight = ode_reference.solve(started(replace(ask, scenario=altered)), switches_of(equation), ask.times)
+        return float(np.max(np.abs(flight.omega - answer.omega))) / abs(knobs.omega0)
+
+    length, radius, causes = knobs.length**2 / 12, knobs.radius**2 / 2, []
+    for name in ("mass", "radius"):  # which may lead to the same omega
+        nearest = min(np.linspace(-2.0, 2.0, 33), key=lambda log_factor: distance(log_factor, name))
+        fit = minimize_scalar(distance, bounds=(nearest - 0.125, nearest + 0.125), args=(name,))
+        if fit.fun <= max(FLOOR / 10, 0.02 * distance(0.0, name)):
+            factor = math.exp(fit.x)
+            inertia = (radius * factor**2 + length) / (radius + length)
+            causes.append(
+                f"M_b were {factor:.3g} of it"
+                if name == "mass"
+                else f"the bottle's own inertia, M_b (R^2/2 + L^2/12), were {inertia:.3g} of it"
+            )
+    return " or ".join(causes)
 
 
 def _wrong_text(comparison: Comparison) -> str:

@@ -31,6 +31,7 @@ from flipproof.foreign.elsewhere import (
     confirmed,
     designed,
     drawn,
+    simpler_throws_advice,
 )
 from flipproof.foreign.solving import opened
 from flipproof.frame.solvers import solve
@@ -513,6 +514,27 @@ def test_a_small_drift_of_angular_momentum_that_no_step_mends_is_a_weakness(drif
 
     (result,) = certify(InProcess(Drifting(), "x"), ["angular-momentum"]).results
     assert result.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("changed", "factor", "said"),
+    [
+        ("radius", 4.0, "own inertia, M_b (R^2/2 + L^2/12), were 2.64 of it"),
+        ("mass", 1.5, "if M_b were 1.5 of"),
+    ],
+)
+def test_another_bottle_is_seen_in_omega_alone(changed, factor, said):
+    class AnotherBottle(Exact):
+        equation = "eq8"
+
+        def solve(self, ask):
+            bottle = ask.scenario.bottle
+            bottle = replace(bottle, **{changed: factor * getattr(bottle, changed)})
+            found = super().solve(replace(ask, scenario=replace(ask.scenario, bottle=bottle)))
+            return {name: found[name] for name in ("t", "theta", "omega")}
+
+    solver = InProcess(AnotherBottle(), "x")
+    assert said in drive(simpler_throws_advice(solver.traits, "eq8"), solver)
 
 
 def test_an_equation_can_be_asked_for_and_what_spoils_it_is_named():
