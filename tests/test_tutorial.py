@@ -41,7 +41,7 @@ def test_every_step_leaves_what_the_page_says(lesson):
 def test_the_fit_finds_the_throw_and_the_equation(lesson):
     track, fit = (json.loads((lesson / name / "summary.json").read_text("utf-8")) for name in ("my-track", "my-fit"))
     best, other = fit["fits"]
-    assert [best["model"], other["model"]] == ["free-flight", "midpoint"]
+    assert [best["model"], other["model"]] == ["free-flight", "eq8"]
     assert best["explains"]
     assert not other["explains"]
     assert best["evidence"] - other["evidence"] > 30
