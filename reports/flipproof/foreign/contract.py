@@ -314,6 +314,8 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
     if not isinstance(given, (Impacts, Mapping)):
         try:
             rows = [tuple(row[name] for name in IMPACT) if isinstance(row, Mapping) else tuple(row) for row in given]  # type: ignore[attr-defined]
+            if counts := {len(row) for row in rows} - {len(IMPACT)}:
+                raise ValueError(f"a row has {min(counts)} numbers, not {len(IMPACT)}")
             given = dict(zip(IMPACT, zip(*rows, strict=True) if rows else [()] * len(IMPACT), strict=True))
         except (TypeError, ValueError, KeyError) as error:
             raise AnswerError(f"impacts are no rows of {', '.join(IMPACT)} ({type(error).__name__}: {error})") from None
