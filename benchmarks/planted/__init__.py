@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -63,6 +64,7 @@ class Patch:
         return module.solve
 
 
+@cache
 def patches(name: str) -> dict[str, Patch]:
     """Return the mistakes of ``NAME.diff`` by name.
 
