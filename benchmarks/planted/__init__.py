@@ -7,6 +7,7 @@ is asked or answers, and those of a ``*.diff`` replace lines of a solver beside 
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -59,7 +60,8 @@ class Patch:
 
     def solver(self) -> Any:
         """Return its function of one ask."""
-        module = ModuleType(self.base)
+        module = ModuleType(f"planted_{self.base}")
+        sys.modules[module.__name__] = module  # where a dataclass looks
         exec(compile(self.text(), self.base, "exec"), module.__dict__)
         return module.solve
 
