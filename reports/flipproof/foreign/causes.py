@@ -27,12 +27,16 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool) -> str:
         return "its slices do not move: look at what is taken for ice"
     # Answers may be arbitrary; no cause can be found for numbers that overflow.
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
-        if cause := _angle_cause(intervals) or _time_cause(intervals):
+        if cause := _place_cause(intervals) or _angle_cause(intervals) or time_cause(intervals):
             return cause
         if all(i.hits for i in intervals):
             return _impact_cause(intervals, recoil=recoil)
         throws = _by_throw(intervals)  # a factor may depend on the mass of a slice
-        return _inertia_cause(throws[0]) or next(filter(None, map(_motion_cause, (intervals, *throws))), "")
+        return (
+            _inertia_cause(throws[0])
+            or _advance_cause(throws[0])
+            or next(filter(None, map(_motion_cause, (intervals, *throws))), "")
+        )
     return ""
 
 
@@ -53,7 +57,7 @@ def _only_field(intervals: Sequence[Interval]) -> str:
     return first if sizes[second] < 0.02 * sizes[first] else ""
 
 
-def _time_cause(intervals: Sequence[Interval]) -> str:
+def time_cause(intervals: Sequence[Interval]) -> str:
     """Return that the solver is at another time than it says, if theta and the places agree on that."""
     delays, residuals, shifts = [], [], []
     for i in intervals:
@@ -142,6 +146,43 @@ def delay(interval: Interval, index: int) -> float:
     offset = interval.r[1][index] - interval.expected["r"][index]
     right = abs(errors[index]) < 0.05 * abs(speed) and abs(offset) > 2 * abs(errors[index]) * interval.throw.duration
     return -offset / speed if right and np.max(np.abs(errors)) < 0.05 * abs(speed) else float("nan")
+
+
+def _place_cause(intervals: Sequence[Interval]) -> str:
+    """Return how far slices are answered beyond an end, if they are in most intervals."""
+    beyond = np.array([max(float(np.max(i.r - i.throw.r_max)), float(np.max(i.throw.r_min - i.r))) for i in intervals])
+    heights = np.array([i.throw.slice_height for i in intervals])
+    outside = beyond > 1e-4 * heights
+    if np.mean(outside) < 0.6:
+        return ""
+    if abs(float(np.max(beyond / heights)) - 0.5) < 0.01:
+        return "slices go on to half their height beyond an end: look at the places of the ends, h/2 and L - h/2"
+    return (
+        f"slices are answered up to {beyond.max():.2g} m beyond an end: an answer between two steps must know of an "
+        "impact on its way: look at times after an impact in the same step"
+    )
+
+
+def _advance_cause(intervals: Sequence[Interval]) -> str:
+    """Return which part of J is missing where theta is advanced, if omega is answered with the right J."""
+    if _rms_by_field(intervals)["omega"] > FLOOR:
+        return ""
+    flying = [i for i in intervals if not i.hits]
+    if len(flying) < 12:
+        return ""
+    r = np.array([i.r.mean(axis=0) for i in flying])
+    parts = parts_of_inertia(flying[0].throw, r)
+    columns = np.array(list(parts.values())).T
+    mean_omega = np.array([i.omega.mean() for i in flying])
+    rate = np.array([(i.theta[1] - i.theta[0]) / i.throw.duration for i in flying])
+    target = columns.sum(axis=1) * mean_omega / rate
+    factors, *_ = np.linalg.lstsq(columns, target, rcond=1e-12)
+    if rms(columns @ factors - target) > 0.05 * rms(columns.sum(axis=1) - target) or np.all(np.abs(factors - 1) < 0.02):
+        return ""
+    counts = " and ".join(
+        f"{name} counts {f:.2g} times" for name, f in zip(parts, factors, strict=True) if abs(f - 1.0) > 0.02
+    )
+    return f"omega is answered rightly, but within a step theta advances with a J in which {counts}"
 
 
 def _angle_cause(intervals: Sequence[Interval]) -> str:
@@ -257,6 +298,8 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
             if best is None or residual < best[0] - 1e-6:
                 best = residual, chosen, factors
         if best is not None and best[0] < 0.03:
+            if best[1] == ("the drag alpha mean(v) / m",) and abs(best[2][0] - (1.0 - share)) < 0.02:
+                return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
             parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))
             return f"its slices accelerate by {parts} besides"
     n = flying[0].throw.n_slices

@@ -187,7 +187,12 @@ def check_inputs(traits: Traits) -> CheckGenerator:
         if ignored
         else "other numbers each time",
         where=f"{len(variants)} parts of the question, each changed alone after the throw of most checks",
-        advice="read it from the question, and keep no answer under a part of the question"
+        advice=(
+            "slices keep the order of ask.start: sort them neither when they are read nor when they are answered; "
+            if "another order of the start" in ignored
+            else ""
+        )
+        + "read it from the question, and keep no answer under a part of the question"
         + (IGNORED.get(ignored[0], "") if len(ignored) == 1 else ""),
     )
 
@@ -407,16 +412,28 @@ SLOW: Final = replace(THROW, omega0=THROW.omega0 / 8, duration=8 * THROW.duratio
 
 
 def check_definitions(traits: Traits) -> CheckGenerator:
-    """r_cm and inertia are those of the slices at the same instant."""
+    """r_cm and inertia are those of the slices at the same instant; slices leave an impact at e times their speed."""
     ask = ask_of(traits, THROW)
     (answer,) = yield [ask]
+    bound = max(2e-5, 64 * traits.epsilon)  # six printed digits are right
+    if (hits := answer.impacts) is not None and len(hits):
+        error = np.abs(hits.speed_after - THROW.restitution * hits.speed_before) * (hits.speed_after > 0)
+        error /= np.max(hits.speed_before)
+        if not error.max() <= 100 * bound:
+            return Observation(
+                holds=False,
+                expected="speed_after = e speed_before of each of the impacts, or 0",
+                observed=f"off by {error.max():.2g} of the largest speed_before",
+                where=time_of_max(hits.time, error),
+                advice="speeds of an impact are those in the bottle, before it and after it: look at how impacts are "
+                "answered",
+            )
     if answer.r is None:
         raise NotApplicableError("no r is given")
     derived = {"r_cm": centre_of_mass(THROW, answer.r), "inertia": moment_of_inertia(THROW, answer.r)}
     scale = {"r_cm": THROW.bottle.length, "inertia": float(np.max(derived["inertia"]))}
     errors = {name: np.abs(getattr(answer, name) - derived[name]) / scale[name] for name in derived}
     worst = max(errors, key=lambda name: float(errors[name].max()))
-    bound = max(2e-5, 64 * traits.epsilon)  # six printed digits are right
     return Observation(
         holds=float(errors[worst].max()) <= bound,
         expected=f"within {bound:.1g} of those that follow from r",
@@ -428,6 +445,18 @@ def check_definitions(traits: Traits) -> CheckGenerator:
         + "r_cm is the centre of mass of bottle and water from the cap, J that about it with the bottle's own: "
         "look at the masses, at the bottle's own inertia, and at where the answer is put together",
     )
+
+
+def _behind_advice(answer: Answer) -> str:
+    """Return that r or v is that of the output before, if the other then goes with it."""
+    assert answer.r is not None
+    assert answer.v is not None
+    slope, mean = np.diff(answer.r, axis=0) / np.diff(answer.t)[:, None], (answer.v[1:] + answer.v[:-1]) / 2
+    together = float(np.quantile(np.abs(slope - mean), 0.9))
+    for name, ahead, behind in (("r", mean, slope), ("v", slope, mean)):
+        if float(np.quantile(np.abs(behind[1:] - ahead[:-1]), 0.9)) < 0.05 * together:
+            return f"{name} is that of the output before: answer r and v of the same instant; "
+    return ""
 
 
 def _delay_advice(answered: FloatArray, exact: FloatArray) -> str:
@@ -497,6 +526,7 @@ def check_velocity(traits: Traits) -> CheckGenerator:
         where="0.05 s",
         advice=_times_advice(answers[0])
         + ("v is the same at all times: answer a copy of each state; " if constant else "")
+        + _behind_advice(answers[0])
         + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )

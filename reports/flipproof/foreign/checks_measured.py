@@ -354,6 +354,10 @@ PIECES: Final = (
 """Throws with and without weight, drag, and rests on one or both ends, of an even and an odd number of slices."""
 
 
+CROWDED: Final = replace(elsewhere.RESTLESS, slices=20)
+"""A throw of many slices, of which several strike in one long step."""
+
+
 def check_piecewise(traits: Traits) -> CheckGenerator:
     """From the solver's own state at each output the equation leads to the next."""
     place = yield from placing(traits)
@@ -363,7 +367,8 @@ def check_piecewise(traits: Traits) -> CheckGenerator:
         raise NotApplicableError("told by the check of the equation")
     if traits.equation is None and not place.on_lattice:
         raise NotApplicableError("no equation is declared")
-    departure, advice = yield from departures.departing(traits, declared, [knobs.ask(0) for knobs in PIECES])
+    asks, crowded = [knobs.ask(0) for knobs in PIECES], [CROWDED.ask(0)]
+    departure, advice = yield from departures.departing(traits, declared, asks, crowded)
     return Observation(
         holds=not departure,
         expected=f"{declared} from one output to the next",

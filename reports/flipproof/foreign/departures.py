@@ -16,12 +16,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.foreign.causes import cause_of, delay, rms
+from flipproof.foreign.causes import cause_of, delay, rms, time_cause
 from flipproof.foreign.checking import NotApplicableError, effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.interval import FLOOR, Interval, intervals_of
 from flipproof.foreign.place import switches_of
-from slicemodel.trajectory import BASE, CAP
+from slicemodel.trajectory import BASE, CAP, FloatArray
 
 BoolArray = NDArray[np.bool_]
 
@@ -129,11 +129,11 @@ SURE: Final = 0.9
 DepartureGenerator = Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]
 
 
-def departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureGenerator:
+def departing(traits: Traits, equation: str, asks: Sequence[Ask], crowded: Sequence[Ask] = ()) -> DepartureGenerator:
     """Return between which outputs of throws a solver departs from an equation, and by what; empty if it does not.
 
-    Asks for each throw again, at ``OUTPUTS`` times, at two to four levels if the solver can be refined. Raises
-    NotApplicableError if the answers lack r or v.
+    Asks for each throw again, at ``OUTPUTS`` times, at two to four levels if the solver can be refined; for ``crowded``
+    ones, of many slices, with long steps only. Raises NotApplicableError if the answers lack r or v.
     """
     if traits.refined_by is None:
         intervals = yield from _intervals_at(traits, equation, asks, 0)
@@ -142,11 +142,12 @@ def departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureGe
     departure = yield from _departing(traits, equation, asks)
     if not departure[0]:
         with suppress(ForeignError):
-            if overlooked := _overlooked((yield from _intervals_at(traits, equation, asks, LONG))):
+            if overlooked := _overlooked((yield from _intervals_at(traits, equation, [*asks, *crowded], LONG))):
                 effort = effort_of(traits, asks[0].scenario, LONG)
                 return (
                     f"{overlooked} at {traits.refined_by} = {effort:.2g}",
-                    "impacts in a part of a long step are overlooked: look at where in a step they are searched for",
+                    "impacts in a part of a long step are overlooked: look at where in a step they are searched for, "
+                    "and whether the earliest of several comes first",
                 )
     return departure
 
@@ -233,16 +234,41 @@ def _spoiled(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval
         return "", ""
     coarse_size, fine_size = (float(np.median([interval.size for interval in intervals])) for intervals in lone)
     delays = np.array([delay(i, i.hits[0][0]) for i in lone[1]])
-    if fine_size < SPOILED or coarse_size > 6 * fine_size or np.mean(delays > 0.0) > 0.5:
+    stale, clock = _same_share(lone[1], delays), time_cause(lone[1])
+    excused = np.mean(delays > 0.0) > 0.5 and not (stale or clock)
+    if fine_size < SPOILED or coarse_size > 6 * fine_size or excused:
         return "", ""
-    advice = "look at the instant of the speed with which a slice strikes, and at the rest of the step after the impact"
-    if np.mean(delays < 0.0) > 0.5:
+    if clock:
+        advice = clock
+    elif stale:
+        advice = (
+            "slices go on for the same share of a step as if they had not struck: look at what the first step after an "
+            "impact takes from before it, such as a rate or a slope"
+        )
+    elif np.mean(delays < 0.0) > 0.5:
         advice = "slices are ahead: look at the rest of a step with an impact, and what is kept over it"
+    else:
+        advice = (
+            "look at the instant of the speed with which a slice strikes, and at the rest of the step after the impact"
+        )
     return (
         f"at impacts that come alone, by {coarse_size:.1g} of a field's scale (median of {len(lone[0])}) and by "
         f"{fine_size:.1g} at a quarter of the step",
         f"steps without an impact have a higher order: {advice}",
     )
+
+
+def _same_share(lone: Sequence[Interval], delays: FloatArray) -> bool:
+    """Return whether slices leave late by what they go too far in equal times with the speed before the impact.
+
+    One that waits for the next step goes too far for a time anywhere between 0 and a step.
+    """
+    e = np.array([interval.throw.restitution for interval in lone])
+    shares = (delays * e / (1.0 + e))[delays > 0.0]
+    if len(shares) < 2 * FEW:
+        return False
+    low, median, high = np.quantile(shares, (0.2, 0.5, 0.8))
+    return bool(high - low < 0.2 * median)
 
 
 def _overlooked(intervals: Sequence[Interval]) -> str:
@@ -312,6 +338,8 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
     where = f"in {common} of {count} intervals between two outputs{category and ' ' + category}{outside}"
     departed = [interval for interval, chosen in zip(intervals, members & departs, strict=True) if chosen]
     cause = cause_of(departed, recoil=switches_of(equation).recoil)
+    if look_at == "impacts on rests" and "recoil" in cause:
+        cause = ""  # other impacts recoil rightly
     if "look at" in cause or (cause and look_at in ("weight", "drag", "odd")):  # the terms are named
         look_at = ""
     advice = f"look at {LOOK_AT[look_at]}" if look_at else ""

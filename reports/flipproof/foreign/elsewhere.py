@@ -493,10 +493,13 @@ def _unmatched(
                 continue
             delay = float(room_of_r[row]) * throw.bottle.length / listed.speed_before[k]
             room = FLOOR + delay / throw.duration
+            # Faint ones near it need not be answered, either.
             own_distances, distances = (
-                np.sort(np.abs(hits.time[(hits.slice == listed.slice[k]) & (hits.end == listed.end[k])] - time))
+                np.sort(
+                    np.abs(hits.time[(hits.slice == listed.slice[k]) & (hits.end == listed.end[k]) & counted] - time)
+                )
                 / throw.duration
-                for hits in (listed, counterpart)
+                for hits, counted in ((listed, listed.speed_before > faint), (counterpart, True))
             )
             count = int(np.sum(own_distances <= room))
             distance = float(distances[count - 1]) if count <= len(distances) else 1.0
@@ -837,7 +840,9 @@ def _field_advice(comparison: Comparison, prefix: str = "", *, ice: bool = False
     if (
         comparison.error
         or "omega" in comparison.wrong
-        or (comparison.impacts_passed and comparison.largest_wrong < FAINT / 4)
+        or (
+            comparison.impacts_passed and (comparison.largest_wrong < FAINT / 4 or set(comparison.wrong) == {"impacts"})
+        )
     ):
         return ""
     fields = ", ".join(comparison.wrong)
