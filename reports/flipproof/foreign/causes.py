@@ -27,15 +27,17 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool) -> str:
         return "its slices do not move: look at what is taken for ice"
     # Answers may be arbitrary; no cause can be found for numbers that overflow.
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
-        if cause := _place_cause(intervals) or _angle_cause(intervals) or time_cause(intervals):
+        if cause := _angle_cause(intervals) or time_cause(intervals):
             return cause
         if all(i.hits for i in intervals):
-            return _impact_cause(intervals, recoil=recoil)
+            return _impact_cause(intervals, recoil=recoil) or _place_cause(intervals)
         throws = _by_throw(intervals)  # a factor may depend on the mass of a slice
         return (
             _inertia_cause(throws[0])
             or _advance_cause(throws[0])
             or next(filter(None, map(_motion_cause, (intervals, *throws))), "")
+            or _place_cause(intervals)
+            or _slice_cause(intervals)
         )
     return ""
 
@@ -302,10 +304,17 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
                 return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
             parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))
             return f"its slices accelerate by {parts} besides"
-    n = flying[0].throw.n_slices
-    wrong = [
-        rms([(i.v[1] - i.expected["v"])[k] for i in flying if i.throw.n_slices == n]) > 1e-3 * size for k in range(n)
-    ]
-    if n > 1 and sum(wrong) == 1:
-        return f"slice {wrong.index(True)} alone is off: look at what is done to it alone, as by a loop over slices"
     return ""
+
+
+def _slice_cause(intervals: Sequence[Interval]) -> str:
+    """Return the slice that alone departs, in flight and of throws of as many slices as the first one's."""
+    flying = [i for i in intervals if not i.hits and np.array_equal(i.before, i.after)]
+    flying = [i for i in flying if i.throw.n_slices == flying[0].throw.n_slices]
+    if len(flying) < 6:
+        return ""
+    errors = np.array([rms(values) for values in zip(*(i.v[1] - i.expected["v"] for i in flying), strict=True)])
+    wrong = errors > 0.2 * np.max(errors)
+    if len(wrong) < 2 or np.sum(wrong) != 1:
+        return ""
+    return f"slice {int(np.argmax(wrong))} alone is off: look at what is done to it alone, as by a loop over slices"

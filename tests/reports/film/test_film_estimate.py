@@ -292,6 +292,17 @@ def test_an_origin_that_moves_is_refused_and_one_frame_clicked_elsewhere_is_not(
         moved._check_origin()
 
 
+@pytest.mark.parametrize(("shift", "refused"), [(0.5, True), (0.0, False)])
+def test_an_origin_that_moves_where_a_point_is_missing_is_refused(quick, shift, refused):
+    one = quick[1].estimate
+    values = one.film.values.copy()
+    values[1, 8] = np.nan
+    values[:, 9:, 0] += shift
+    moved = Assessment(replace(one, film=replace(one.film, values=values)))
+    with pytest.raises(UnsoundError, match="both ends jump by 0.") if refused else nullcontext():
+        moved._check_origin()
+
+
 def test_a_bad_click_of_each_end_in_two_frames_is_no_jump_of_the_origin(quick):
     one = quick[1].estimate
     values = one.film.values.copy()
