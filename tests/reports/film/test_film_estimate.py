@@ -299,7 +299,7 @@ def test_an_origin_that_moves_where_a_point_is_missing_is_refused(quick, shift, 
     values[1, 8] = np.nan
     values[:, 9:, 0] += shift
     moved = Assessment(replace(one, film=replace(one.film, values=values)))
-    with pytest.raises(UnsoundError, match="both ends jump by 0.") if refused else nullcontext():
+    with pytest.raises(UnsoundError, match="both ends jump by") if refused else nullcontext():
         moved._check_origin()
 
 
