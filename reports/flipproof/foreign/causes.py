@@ -249,11 +249,16 @@ def _rate_cause(intervals: Sequence[Interval]) -> str:
     return f"omega alone is off: of the changes of J = {' + '.join(after)} {counts}"
 
 
+def _undisturbed(intervals: Sequence[Interval]) -> list[Interval]:
+    """Return the intervals in which nothing strikes an end, and no slice comes to rest or is let go."""
+    return [i for i in intervals if not i.hits and np.array_equal(i.before, i.after)]
+
+
 def _motion_cause(intervals: Sequence[Interval]) -> str:
     """Return the extra terms in the acceleration of flying slices, if one to three explain it."""
     if (field := _only_field(intervals)) not in ("", "v"):
         return f"{field} alone is off"
-    flying = [i for i in intervals if not i.hits and np.array_equal(i.before, i.after)]
+    flying = _undisturbed(intervals)
     if len(flying) < 6:
         return ""
     rows: dict[str, list[FloatArray]] = {}
@@ -309,7 +314,7 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
 
 def _slice_cause(intervals: Sequence[Interval]) -> str:
     """Return the slice that alone departs, in flight and of throws of as many slices as the first one's."""
-    flying = [i for i in intervals if not i.hits and np.array_equal(i.before, i.after)]
+    flying = _undisturbed(intervals)
     flying = [i for i in flying if i.throw.n_slices == flying[0].throw.n_slices]
     if len(flying) < 6:
         return ""
