@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,9 @@ JUMP: Final = 0.35
 
 In 1080 simulated films, every third with twelve points missing, hands and bad clicks leave 0.062 at the most.
 """
+
+MAX_GAP: Final = 3.5
+"""Frames over which an end may move unseen beside a jump."""
 
 SHOWN: Final = ("gamma", "restitution", "omega0", "theta0", "release", "touch", "tilt", "g", "noise", "length")
 
@@ -182,6 +185,11 @@ class Assessment:
                     f"{film.label}: the release at {x[0]:.4g} s lies within two frames of the first: click frames "
                     "before the hand lets go, or give --release"
                 )
+            if abs(estimate.best["tilt"]) > 90.0:
+                raise UnsoundError(
+                    f"{film.label}: gravity points up in the picture, {abs(estimate.best['tilt']):.0f} degrees from "
+                    "down: y points up, not down as in an image's pixels"
+                )
             if (gain := exchange_gain(estimate, EXCHANGED)) > EXCHANGED:
                 raise UnsoundError(
                     f"{film.label}: with cap and base exchanged the clicks are exp({gain:.0f}) times as likely: name "
@@ -208,17 +216,15 @@ class Assessment:
     def _check_origin(self) -> None:
         """Refuse clicks of which both ends jump alike from one frame to the next, before the touch."""
         estimate, film = self.estimate, self.estimate.film
-        both = film.clicked.all(axis=0)
-        t = film.t[both]
-        size, alike = common_jumps(t, film.values[:, both])
-        gap = np.maximum(np.maximum(t[1:-2] - t[:-3], t[2:-1] - t[1:-2]), t[3:] - t[2:-1])
-        gap /= float(np.median(np.diff(film.t)))
-        sizes = np.where(alike & (gap < 3.5) & (t[3:] < estimate.likelihood.touch), size / gap, 0.0)
+        jumps = common_jumps(film.t, film.values)
+        gap = jumps.gap / float(np.median(np.diff(film.t)))
+        usable = jumps.alike & (gap < MAX_GAP) & (jumps.until < estimate.likelihood.touch)
+        sizes = np.where(usable, jumps.size / gap, 0.0)
         k = int(np.argmax(sizes)) if len(sizes) else 0
         if len(sizes) and sizes[k] > JUMP * estimate.best["length"]:
             raise UnsoundError(
-                f"{film.label}: both ends jump by {size[k]:.2g} m from {t[k + 1]:.3f} to {t[k + 2]:.3f} s: "
-                "click one clip, with one origin in all of its frames"
+                f"{film.label}: both ends jump by {jumps.size[k]:.2g} m from {jumps.begin[k]:.3f} to "
+                f"{jumps.end[k]:.3f} s: click one clip, with one origin in all of its frames"
             )
 
     def _check_release(self) -> None:
@@ -338,19 +344,45 @@ class Assessment:
         )
 
 
-def common_jumps(t: FloatArray, ends: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return how far both ends jump together between the middle two of any four frames, and if alike, (P - 3,) each.
+class Jumps(NamedTuple):
+    """How both ends jump together from one frame to the next with both clicked, (P,) each.
 
-    A jump is what a move exceeds that at the mean velocity of the moves before and after it. ``ends`` are (2, P, 2).
+    A jump is what a move exceeds that at the mean velocity of the moves before and after it, an end's own. ``begin``
+    and ``end`` are the two frames [s], ``until`` the last that is used, ``gap`` the longest move of the end that was
+    clicked more densely.
     """
-    velocities = np.diff(ends, axis=1) / np.diff(t)[:, None]
-    step = np.diff(t)[1:-1, None]
-    jumps = (velocities[:, 1:-1] - (velocities[:, :-2] + velocities[:, 2:]) / 2) * step
+
+    size: FloatArray
+    alike: NDArray[np.bool_]
+    begin: FloatArray
+    end: FloatArray
+    until: FloatArray
+    gap: FloatArray
+
+
+def common_jumps(t: FloatArray, ends: FloatArray) -> Jumps:
+    """Return the jumps of both ends, (2, P, 2) with NaN where a click is missing."""
+    clicked: NDArray[np.bool_] = np.asarray(~np.isnan(ends).any(axis=2))
+    both = np.flatnonzero(clicked.all(axis=0))
+    pairs = np.array([both[:-1], both[1:]])
+    clicks = [np.flatnonzero(clicked[end]) for end in range(2)]
+    for own in clicks:
+        if len(own):
+            pairs = pairs[:, (pairs[0] > own[0]) & (pairs[1] < own[-1])]
+    frames = np.array(  # of each end: the click before, the two, the click after
+        [[own[np.searchsorted(own, pairs[0]) - 1], *pairs, own[np.searchsorted(own, pairs[1]) + 1]] for own in clicks]
+    )
+    times = t[frames]
+    velocities = np.array([np.diff(end[rows], axis=0) for end, rows in zip(ends, frames, strict=True)])
+    velocities /= np.diff(times, axis=1)[..., None]
+    step = (times[0, 2] - times[0, 1])[:, None]
+    jumps = (velocities[:, 1] - (velocities[:, 0] + velocities[:, 2]) / 2) * step
     size = np.linalg.norm(jumps.mean(axis=0), axis=1)
     alike = np.linalg.norm(jumps[0] - jumps[1], axis=1) < 0.3 * size
     # An end that is clicked elsewhere, and returns, changes the move after it, too.
-    alike &= np.linalg.norm((velocities[:, 2:] - velocities[:, :-2]) * step, axis=2).max(axis=0) < 0.5 * size
-    return size, alike
+    alike &= np.linalg.norm((velocities[:, 2] - velocities[:, 0]) * step, axis=2).max(axis=0) < 0.5 * size
+    gap = np.diff(times, axis=1).max(axis=1).min(axis=0)
+    return Jumps(size, alike, times[0, 1], times[0, 2], times[:, 3].max(axis=0), gap)
 
 
 def nearest_turn(angle: FloatArray, reference: FloatArray) -> FloatArray:

@@ -292,11 +292,12 @@ def test_an_origin_that_moves_is_refused_and_one_frame_clicked_elsewhere_is_not(
         moved._check_origin()
 
 
+@pytest.mark.parametrize("missing", [(1, 8), (0, slice(5, 8))])
 @pytest.mark.parametrize(("shift", "refused"), [(0.5, True), (0.0, False)])
-def test_an_origin_that_moves_where_a_point_is_missing_is_refused(quick, shift, refused):
+def test_an_origin_that_moves_where_points_are_missing_is_refused(quick, missing, shift, refused):
     one = quick[1].estimate
     values = one.film.values.copy()
-    values[1, 8] = np.nan
+    values[missing] = np.nan
     values[:, 9:, 0] += shift
     moved = Assessment(replace(one, film=replace(one.film, values=values)))
     with pytest.raises(UnsoundError, match="both ends jump by") if refused else nullcontext():
@@ -318,6 +319,12 @@ def test_exchanged_ends_are_refused_whatever_flight_is_found_in_them(request, wh
     assert exchange_gain(one, EXCHANGED) < -EXCHANGED
     with pytest.raises((UnsoundError, NoFlightError), match="exchanged"):
         Assessment(estimate(exchanged(one.film), THROW)).check()
+
+
+def test_a_flight_that_falls_upwards_in_the_picture_is_refused(quick):
+    one = quick[1].estimate
+    with pytest.raises(UnsoundError, match="y points up"):
+        Assessment(replace(one, draws=one.draws | {"tilt": one.draws["tilt"] + 180.0})).check()
 
 
 def test_a_known_table_is_where_the_flight_ends(bottles):
