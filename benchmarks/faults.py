@@ -1,4 +1,4 @@
-"""Plant single-line faults in all four packages and hold each against the tests of its folder.
+"""Plant single-line faults in all four packages and a benchmark; hold each against the tests of its folder.
 
     python benchmarks/faults.py                # all of them
     python benchmarks/faults.py flow scatter   # those whose file or fault contains a word
@@ -55,14 +55,14 @@ FAULTS = (
     ("ode_reference/landing/motion.py", "side, turn = -2 * m * mean * rate1", "side, turn = -m * mean * rate1",
      "test_landing.py"),
     ("ode_reference/landing/motion.py", "(1.0 + world.e_water) * w[i]", "world.e_water * w[i]", "test_landing.py"),
-    ("ode_reference/ideal_water.py", "self.b[k] = self.q[2] * (dx if k else -dy)", "self.b[k] = gx * dx + gy * dy",
-     "test_ideal_water.py"),
-    ("ode_reference/ideal_water.py", "bend = 0.5 * self.q[2] ** 2 * dt", "bend = 0.0 * dt", "test_ideal_water.py"),
-    ("ode_reference/ideal_water.py", "self.spin -= dt * (self.u", "self.spin += dt * (self.u", "test_ideal_water.py"),
-    ("ode_reference/ideal_water.py", "w[:, -1, 2] += hx * xc", "w[:, -1, 2] -= hx * xc", "test_ideal_water.py"),
-    ("ode_reference/ideal_water.py", "u -= amplitude * k * even", "u += amplitude * k * even", "test_ideal_water.py"),
-    ("ode_reference/ideal_water.py", "np.maximum(let_out, 0.0), let_out)", "let_out, let_out)",
-     "test_ideal_water.py"),
+    ("benchmarks/grid_water.py", "self.b[k] = self.q[2] * (dx if k else -dy)", "self.b[k] = gx * dx + gy * dy",
+     "test_grid_water.py"),
+    ("benchmarks/grid_water.py", "bend = 0.5 * self.q[2] ** 2 * dt", "bend = 0.0 * dt", "test_grid_water.py"),
+    ("benchmarks/grid_water.py", "self.spin -= dt * (self.u", "self.spin += dt * (self.u", "test_grid_water.py"),
+    ("benchmarks/grid_water.py", "w[:, -1, 2] += hx * xc", "w[:, -1, 2] -= hx * xc", "test_grid_water.py"),
+    ("benchmarks/grid_water.py", "u -= amplitude * k * even", "u += amplitude * k * even", "test_grid_water.py"),
+    ("benchmarks/grid_water.py", "np.maximum(let_out, 0.0), let_out)", "let_out, let_out)",
+     "test_grid_water.py"),
     ("ode_reference/rods.py", "(self.below - self.above) / 2 + z *", "(self.below - self.above) / 2 - z *",
      "test_rods_model.py"),
     ("engine_check/mujoco_impacts.py", "2.0 * u < (1.0 - self.restitution)", "2.0 * u < (1.0 + self.restitution)",

@@ -19,12 +19,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import grid_water
 import numpy as np
+from grid_water import WaterFlight
 
 import ode_reference
 from flipproof.paper.cases import numbers
-from ode_reference import ideal_water
-from ode_reference.ideal_water import WaterFlight
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 
@@ -47,7 +47,7 @@ KINDS: Final = (False, True)
 PLAN: Final = (
     *(Flight(f, "spinning", cells, kind) for cells in (8, 16) for kind in KINDS for f in numbers("figure-7-filling")),
     *(Flight(f, "spinning", 32, kind) for kind in KINDS for f in FILLINGS),
-    *(Flight(f, start, 16, False) for start in ideal_water.STARTS[1:] for f in (0.25, 0.5)),
+    *(Flight(f, start, 16, False) for start in grid_water.STARTS[1:] for f in (0.25, 0.5)),
 )
 """What the report shows: the fillings of the paper's Fig. 7, which its statements need, on two grids."""
 
@@ -56,7 +56,7 @@ def fly(flight: Flight) -> dict[str, Any]:
     """Return one flight's numbers, and omega / omega_0 at 101 equal times."""
     began = time.process_time()
     scenario = replace(Scenario(), water_mass=flight.filling)
-    run = ideal_water.solve(scenario, flight.start, cells=flight.cells, suction=flight.suction)
+    run = grid_water.solve(scenario, flight.start, cells=flight.cells, suction=flight.suction)
     taken = time.process_time() - began
     late, share = run.t >= scenario.duration / 2, run.omega / scenario.omega0
     below = np.flatnonzero(share < 0.75)
@@ -93,7 +93,7 @@ def record(row: dict[str, Any]) -> None:
     rows.sort(key=lambda each: (each["cells"], each["suction"], each["start"], each["filling"]))
     text = ",\n".join("  " + json.dumps(each) for each in rows)
     provenance = (
-        "ode_reference.ideal_water in the paper's throw; made again by python benchmarks/ideal_water.py --record"
+        "benchmarks/grid_water.py in the paper's throw; made again by python benchmarks/ideal_water.py --record"
     )
     RECORD.write_text(
         f'{{\n "provenance": {json.dumps(provenance)},\n "flights": [\n{text}\n ]\n}}\n', encoding="utf-8"
@@ -102,7 +102,7 @@ def record(row: dict[str, Any]) -> None:
 
 def growth(cells: int) -> float:
     """Return J''(0) / J_0 of a half-full bottle with suction, from the first 10 ms [1/s^2]."""
-    run = ideal_water.solve(replace(Scenario(), duration=0.01), cells=cells, suction=True)
+    run = grid_water.solve(replace(Scenario(), duration=0.01), cells=cells, suction=True)
     # J / J_0 = 1 + J''(0) t^2 / (2 J_0) + O(t^4)
     square = np.column_stack([run.t**2 / 2, run.t**4])
     return float(np.linalg.lstsq(square, run.inertia / run.inertia[0] - 1, rcond=None)[0][0])
@@ -112,7 +112,7 @@ def slender(radius: float) -> tuple[float, float]:
     """Return J / J_0 - 1 after 30 ms in a thin half-full bottle: of water with 4 cells across, and of rods."""
     bottle = replace(Scenario().bottle, radius=radius)
     scenario = replace(Scenario(), bottle=bottle, drag=0.0, duration=0.04)
-    run = ideal_water.solve(scenario, cells=4)
+    run = grid_water.solve(scenario, cells=4)
     rods = ode_reference.solve(scenario, "rods", times=[0.0, 0.03])
     return float(np.interp(0.03, run.t, run.inertia / run.inertia[0])) - 1, float(rods.omega[0] / rods.omega[1]) - 1
 
@@ -122,10 +122,10 @@ def kept() -> Iterator[str]:
 
     def run(start: str = "spinning", *, filling: float = 0.5, suction: bool = False, **changes: Any) -> WaterFlight:
         scenario = replace(Scenario(), **{"water_mass": filling, **changes})
-        return ideal_water.solve(scenario, start, cells=8, suction=suction)
+        return grid_water.solve(scenario, start, cells=8, suction=suction)
 
     runs = [run(filling=filling, suction=suction) for filling in (*FILLINGS, 1.0) for suction in (False, True)]
-    runs += [run(start) for start in ideal_water.STARTS[1:]]
+    runs += [run(start) for start in grid_water.STARTS[1:]]
     yield (
         f"of {len(runs)} flights, every filling and start: largest drift of angular momentum "
         f"{max(float(np.abs(each.drift).max()) for each in runs):.0e}, momentum "
@@ -141,14 +141,14 @@ def kept() -> Iterator[str]:
 def at_release() -> Iterator[str]:
     """Yield pressure and inertia of the first instant, with 16 cells."""
     scenario = replace(Scenario(), water_mass=1.0, duration=0.005)
-    bottle, run = scenario.bottle, ideal_water.solve(scenario)
+    bottle, run = scenario.bottle, grid_water.solve(scenario)
     x, y = ((np.arange(n) + 0.5) / n - 0.5 for n in run.pressure.shape)
     place = (x[:, None] * bottle.length) ** 2 + (y * 2 * bottle.radius) ** 2
     expected = bottle.capacity / (bottle.length * 2 * bottle.radius) * scenario.omega0**2 * place / 2
     off = np.ptp(run.pressure - expected) / np.ptp(expected)
     yield f"pressure in a turning full bottle: off by {off:.2%} of its range"
     for filling, known in ((1.0, 0.760), (0.5, 0.517)):
-        run = ideal_water.solve(replace(Scenario(), water_mass=filling, duration=0.001), "irrotational")
+        run = grid_water.solve(replace(Scenario(), water_mass=filling, duration=0.001), "irrotational")
         share = run.angular_momentum[0] / (run.inertia[0] * run.omega[0])
         yield f"irrotational water, filling {filling:g}: L_0/(J_0 omega_0) {share:.4f}   series {known:.3f}"
 
@@ -157,7 +157,7 @@ def verification() -> Iterator[str]:
     """Yield one line for each thing that is known exactly."""
     yield from kept()
     yield from at_release()
-    exact = ideal_water.first_growth(Scenario())
+    exact = grid_water.first_growth(Scenario())
     yield f"J''(0)/J_0, half full, suction: exact {exact:.3f} /s^2"
     values = {cells: growth(cells) for cells in (8, 12, 16, 24)}
     for cells, value in values.items():
@@ -173,7 +173,7 @@ def verification() -> Iterator[str]:
     yield "full bottle, omega/omega_0 = 1 from either start: mean of the second half - 1, largest departure, energy - 1"
     for start in ("spinning", "irrotational"):
         for cells in (8, 12, 16, 24):
-            run = ideal_water.solve(replace(Scenario(), water_mass=1.0), start, cells=cells)
+            run = grid_water.solve(replace(Scenario(), water_mass=1.0), start, cells=cells)
             share = run.omega / run.omega[0]
             yield (
                 f"  {start:<13}{cells:>3} cells {plateau(run.t, run.omega, run.omega[0]) - 1:+.1e} "
@@ -196,7 +196,7 @@ def main() -> None:
             print(text, flush=True)
         return
     kinds = {"yes": (True,), "no": (False,), "both": (False, True)}[asked.suction]
-    starts = ideal_water.STARTS if asked.starts else ideal_water.STARTS[:1]
+    starts = grid_water.STARTS if asked.starts else grid_water.STARTS[:1]
     flights = [Flight(f, s, c, kind) for c in asked.cells for kind in kinds for f in asked.fillings for s in starts]
     if asked.record:
         flights = [flight for flight in PLAN if flight.cells in asked.cells and flight.suction in kinds]

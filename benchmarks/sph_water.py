@@ -4,7 +4,7 @@
     python benchmarks/sph_water.py --spacing 0.008 0.004 0.002    # 2 mm: one to five minutes a flight
     python benchmarks/sph_water.py --fillings 1 --start irrotational
 
-It shares no line and no method with ``ode_reference.ideal_water``, which it is held against: particles instead of a
+It shares no line and no method with ``grid_water``, which it is held against: particles instead of a
 grid, a little compressible instead of incompressible, explicit forces instead of a pressure solve. The columns beside
 its own are rods as points, rods with the inertia of discs, both without drag, and ideal water with --cells across.
 
@@ -30,11 +30,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
+import grid_water
 import numpy as np
 from numpy.typing import NDArray
 
 import ode_reference
-from ode_reference import ideal_water
 from slicemodel import Scenario
 from slicemodel.compiled import kept_on_disk
 from slicemodel.observables import plateau
@@ -242,7 +242,7 @@ def lines(asked: argparse.Namespace) -> Iterator[str]:
             plateau(run.t, run.omega, scenario.omega0)
             for run in (ode_reference.solve(scenario, "rods", own_inertia=own) for own in (False, True))
         ]
-        ideal = ideal_water.solve(scenario, asked.start, cells=asked.cells)
+        ideal = grid_water.solve(scenario, asked.start, cells=asked.cells)
         late = ideal.t >= scenario.duration / 2
         lost = 1 - float((ideal.omega * ideal.inertia / ideal.angular_momentum)[late].mean())
         beside = f"{levels[0]:<7.3f}{levels[1]:<7.3f}{plateau(ideal.t, ideal.omega, scenario.omega0):.3f} ({lost:.2f})"

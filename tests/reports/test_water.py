@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import grid_water
 import numpy as np
 import pytest
 
@@ -28,7 +29,6 @@ from flipproof.frame.solvers import make
 from flipproof.paper.cases import family
 from flipproof.paper.experiment import OBSERVATIONS
 from flipproof.paper.observe import steady_level
-from ode_reference import ideal_water
 from slicemodel import Scenario
 
 
@@ -80,7 +80,7 @@ def test_our_own_fluid_gives_again_what_is_recorded_of_it(suction):
         for flight in own_fluid()["flights"]
         if (flight["filling"], flight["cells"], flight["suction"]) == (0.5, 8, suction)
     ]
-    run = ideal_water.solve(replace(Scenario(), duration=0.15), cells=8, suction=suction)
+    run = grid_water.solve(replace(Scenario(), duration=0.15), cells=8, suction=suction)
     assert run.t[np.flatnonzero(run.omega < 15.0)[0]] == pytest.approx(kept["early"], abs=2e-4)
     assert all(flight["drift"] < 1e-10 for flight in own_fluid()["flights"])
 

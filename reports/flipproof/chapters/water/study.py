@@ -53,7 +53,7 @@ def fluids() -> Mapping[str, Any]:
 
 @cache
 def own_fluid() -> Mapping[str, Any]:
-    """Return the flights of ``ode_reference.ideal_water`` that its benchmark recorded."""
+    """Return the flights of ``benchmarks/grid_water.py`` that ``benchmarks/ideal_water.py`` recorded."""
     return _read("own_fluid.json")
 
 
