@@ -20,7 +20,7 @@ Newton's law on all gaps that are zero at that instant at once, with one restitu
 which is the minimum of |M^-1/2 G^T p - d|^2 over p >= 0 where d is any vector with G M^-1/2 d = -(1 + e) w.
 
 Nothing here is shared with ``ode_reference.models``: there the places are relative to the tube and slices pass
-through each other. Meant for few rods; the exact motion at e = 0 without drag is ``ode_reference.rod_stacks``.
+through each other. Meant for few rods; the exact motion at e = 0 without drag is ``rod_stacks``.
 """
 
 from __future__ import annotations

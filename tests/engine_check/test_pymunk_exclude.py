@@ -8,6 +8,7 @@ import engine_worlds
 import numpy as np
 import pymunk
 import pytest
+import rod_stacks
 import rods_by_events as event_driven
 from engine_worlds import caps, slice_shapes, with_all
 
@@ -17,7 +18,6 @@ from engine_check.pymunk_settings import PymunkKnobs
 from engine_check.pymunk_setup import verify
 from engine_check.pymunk_world import BatchReader, build
 from engine_check.watch import State
-from ode_reference import rod_stacks
 from slicemodel.scenario import Bottle, Scenario
 
 FULL_BOTTLE = 1e-3

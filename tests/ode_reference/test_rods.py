@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import rod_stacks
 import rods_by_events as by_events
 
-from ode_reference import rod_stacks, solve
+from ode_reference import solve
 from slicemodel import observables
 from slicemodel.scenario import Bottle, Scenario
 

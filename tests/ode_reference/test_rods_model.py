@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import rod_stacks
 
 import engine_check
 import ode_reference
-from ode_reference import rod_stacks
 from ode_reference.rods import Rods
 from slicemodel import Bottle, Scenario, observables
 
@@ -52,6 +52,15 @@ def test_many_rods_tend_to_it(filling):
 
     factors = [(scaled(n) + scaled(n + 1)) / 2 for n in (coarse, fine)]
     assert abs(factors[1] - factors[0]) / (fine**2 - coarse**2) < 1e-6
+
+
+def test_half_full_the_difference_is_what_the_theory_says():
+    limit = ode_reference.solve(throw(0.5), "rods", TIMES[::2])
+    apart = []
+    for n in (50, 100, 200):
+        many = rod_stacks.solve(throw(0.5, n_slices=n)).at(TIMES[::2])[1]
+        apart.append(np.abs(many - limit.omega).max() / 20.0 * n**2)
+    assert max(apart) < 2.0  # 8e-4, 2e-4, 5e-5 of omega_0 at the most
 
 
 def test_a_bottle_nearly_full_is_extrapolated_until_the_last_rod_lands():
