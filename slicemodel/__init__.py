@@ -12,7 +12,6 @@ from slicemodel.scenario import Bottle, Scenario, ScenarioError
 
 if TYPE_CHECKING:
     from slicemodel.batch import Batch, solve_batch
-    from slicemodel.landing import touch
     from slicemodel.solver import solve
     from slicemodel.step_advice import required_steps
     from slicemodel.table import Outcome, Table, Touch
@@ -35,7 +34,6 @@ __all__ = [
     "required_steps",
     "solve",
     "solve_batch",
-    "touch",
 ]
 
 _HOMES = {
@@ -49,7 +47,6 @@ _HOMES = {
     "Table": "slicemodel.table",
     "Touch": "slicemodel.table",
     "Trajectory": "slicemodel.trajectory",
-    "touch": "slicemodel.landing",
 }
 
 

@@ -9,11 +9,12 @@ import pytest
 import rods_by_events
 from landing_forms import Block, at_rest, corner_ratio, ends_upright
 from scipy.integrate import quad
+from touches import touch
 
 import engine_check
 import ode_reference
 from ode_reference.landing.land import path, world_of
-from slicemodel import Bottle, Scenario, ScenarioError, Table, touch
+from slicemodel import Bottle, Scenario, ScenarioError, Table
 from slicemodel.observables import static_toppling_angle
 
 G = 9.81

@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rods_by_events
+from touches import touch
 
 import ode_reference
-from slicemodel import Scenario, Table, touch
+from slicemodel import Scenario, Table
 
 THROW = Scenario(n_slices=4, water_mass=0.4, drag=1.0, restitution=0.5, omega0=15.0, duration=0.8)
 TABLE = Table(height=-0.36)

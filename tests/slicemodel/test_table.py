@@ -6,9 +6,10 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from touches import touch
 
 import slicemodel
-from slicemodel import Outcome, Scenario, ScenarioError, Table, Touch, touch
+from slicemodel import Outcome, Scenario, ScenarioError, Table, Touch
 from slicemodel.landing import lab_motion
 
 THROW = Scenario(n_slices=20, omega0=16.0)
