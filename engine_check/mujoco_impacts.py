@@ -42,7 +42,6 @@ BLOCK_ROUNDS: Final = 10
 ROUND_OFF: Final = 1e-12
 
 IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(slots=True, eq=False)
