@@ -41,7 +41,6 @@ class Moment:
     theta : float [rad], omega : float [rad/s]
     r_cm : float - centre of mass from the cap [m]
     v_cm : float - its velocity in the bottle [m/s], positive towards the base
-    v_cm_lab : (v_x, v_y) - its velocity in the lab [m/s]
     toppling_angle : float - of the bottle with its water where it is [rad] (Eq. 13a)
     """
 
@@ -50,23 +49,7 @@ class Moment:
     omega: float
     r_cm: float
     v_cm: float
-    v_cm_lab: tuple[float, float]
     toppling_angle: float
-
-    @property
-    def tilt(self) -> float:
-        """Return the angle from upright, theta modulo 2 pi, in [-pi, pi] [rad]."""
-        return math.remainder(self.theta, math.tau)
-
-    @property
-    def margin(self) -> float:
-        """Return by how much the tilt stays below the toppling angle [rad]; negative: the bottle topples."""
-        return self.toppling_angle - abs(self.tilt)
-
-    @property
-    def upright(self) -> bool:
-        """True if a bottle put down like this, at rest, would come back upright (section 6)."""
-        return self.margin > 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +106,6 @@ def moment_at(trajectory: Trajectory, time: float) -> Moment:
         omega=omega,
         r_cm=r_cm,
         v_cm=v,
-        v_cm_lab=(scenario.launch_velocity[0], scenario.launch_velocity[1] - scenario.gravity * float(time)),
         toppling_angle=float(toppling_angle(scenario, r_cm)),
     )
 

@@ -6,37 +6,18 @@ import math
 
 import numpy as np
 
-from slicemodel import ScenarioError, Table, Touch, Trajectory
+from slicemodel import Table, Touch, Trajectory
 from slicemodel.landing import landing
 
 
 def touch(trajectory: Trajectory, table: Table) -> Touch:
     """Return the bottle as it first comes down on the table, by linear interpolation between output times.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-        With its slices (not stored as "summary").
-    table : Table
-        Its height as in ``landing``.
-
-    Raises
-    ------
-    ScenarioError
-        If the table is not reached from above during the flight, or the trajectory holds no slices.
-
-    Accuracy
-    --------
-    Second order in the spacing of the output times; neither the order of slices nor the room they need is broken.
+    Second order in their spacing; neither the order of slices nor the room they need is broken.
     """
     scenario, t = trajectory.scenario, trajectory.t
-    if len(trajectory.r) != len(t):
-        raise ScenarioError("the trajectory holds no slices (stored as a summary): solve it in full")
     crossing = landing(trajectory, table.height)
-    if crossing is None:
-        raise ScenarioError(
-            f"table.height = {table.height:g} m is not reached from above within the flight of {t[-1]:g} s"
-        )
+    assert crossing is not None
     now = crossing.moment
     k = int(np.clip(np.searchsorted(t, now.time, side="right") - 1, 0, len(t) - 2))
     share = (now.time - t[k]) / (t[k + 1] - t[k])
@@ -49,8 +30,8 @@ def touch(trajectory: Trajectory, table: Table) -> Touch:
         theta=now.theta,
         omega=now.omega,
         velocity=(
-            now.v_cm_lab[0] - now.v_cm * sine + swing * cosine,
-            now.v_cm_lab[1] + now.v_cm * cosine + swing * sine,
+            scenario.launch_velocity[0] - now.v_cm * sine + swing * cosine,
+            scenario.launch_velocity[1] - scenario.gravity * now.time + now.v_cm * cosine + swing * sine,
         ),
         r=r,
         v=np.zeros_like(v) if scenario.frozen else v,

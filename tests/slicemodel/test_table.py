@@ -120,18 +120,3 @@ def test_the_touch_is_where_a_corner_meets_the_table():
     slope = (middle[k + 1] - middle[k - 2]) / (flight.t[k + 1] - flight.t[k - 2])
     assert start.velocity == pytest.approx(slope, abs=5e-3)
     assert np.all(np.abs(start.r - flight.r[k]) < 1e-2)
-
-
-def test_a_table_that_is_never_reached_is_refused():
-    flight = slicemodel.solve(THROW)
-    with pytest.raises(
-        ScenarioError, match=r"table.height = -5 m is not reached from above within the flight of 0.5 s"
-    ):
-        touch(flight, Table(height=-5.0))
-
-
-def test_a_summary_has_no_slices_to_land():
-    flight = slicemodel.solve(THROW)
-    summary = replace(flight, r=np.empty((0, 20)), v=np.empty((0, 20)))
-    with pytest.raises(ScenarioError, match="holds no slices"):
-        touch(summary, TABLE)
