@@ -185,15 +185,15 @@ class Assessment:
                     f"{film.label}: the release at {x[0]:.4g} s lies within two frames of the first: click frames "
                     "before the hand lets go, or give --release"
                 )
-            if abs(estimate.best["tilt"]) > 90.0:
-                raise UnsoundError(
-                    f"{film.label}: gravity points up in the picture, {abs(estimate.best['tilt']):.0f} degrees from "
-                    "down: y points up, not down as in an image's pixels"
-                )
             if (gain := exchange_gain(estimate, EXCHANGED)) > EXCHANGED:
                 raise UnsoundError(
                     f"{film.label}: with cap and base exchanged the clicks are exp({gain:.0f}) times as likely: name "
                     "the other track as the cap"
+                )
+            if abs(estimate.best["tilt"]) > 90.0:
+                raise UnsoundError(
+                    f"{film.label}: gravity points up in the picture, {abs(estimate.best['tilt']):.0f} degrees from "
+                    "down: y points up, not down as in an image's pixels"
                 )
             low, high = estimate.interval("g", 0.9999)
             if not held.scale and not low - SCALE_ERROR * GRAVITY <= GRAVITY <= high + SCALE_ERROR * GRAVITY:
