@@ -213,7 +213,7 @@ def test_a_body_that_sinks_does_not_hop():
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_planted_mistake_is_remarked_and_named_where_it_is(mistake):
     drop, name, words = MISTAKES[mistake]
-    assert words in passport(Adapter(mistake, drop)).remarks[name]
+    assert words in MEASURES[name](Adapter(mistake, drop), 1e-3).remark
 
 
 def test_thresholds_are_measured():

@@ -17,6 +17,7 @@ import ode_reference
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.checking import drive
+from flipproof.foreign.checks_measured import PIECES
 from flipproof.foreign.contract import IMPACT, Ask, ForeignError, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.elsewhere import (
@@ -35,6 +36,7 @@ from flipproof.foreign.elsewhere import (
     drawn,
     simpler_throws_advice,
 )
+from flipproof.foreign.place import name_of, switches_of
 from flipproof.foreign.solving import opened
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
@@ -616,16 +618,12 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("theta0_ignored", "start", "begin at scenario.theta0"),
         ("cached_by_number_of_slices", "determinism", "keep nothing under a part of the throw"),
         ("ice_starts_at_zero", "ice", "let theta go on from theta_0"),
-        ("flight_ends_at_half_a_second", "piecewise", "the answer stands still there, first at t = 0.5"),
         ("answers_cached_without_start", "start", "cache nothing by throw"),
         ("restitution_hardcoded", "inputs", "with another restitution"),
         ("tolerance_of_the_module", "refinement", "or declare no refined_by"),
         ("adaptive_leaves_off_just_before_answer", "velocity", "theta stands still between two of the times asked"),
         ("fixed_omega_from_differences", "start", "not a slope of theta"),
-        ("rest_of_step_lost", "piecewise", "look at the clock, and at the rest of a step"),
-        ("adaptive_cap_rebound_put_on_base", "piecewise", "with an impact on the cap, in none of"),
         ("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating"),
-        ("halving_drag_of_momentum", "piecewise", "x the drag alpha v_CM / m besides"),
         ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
         pytest.param(
             "halving_released_level", "mirror", "right without weight: look at the weight", marks=pytest.mark.slow
@@ -663,12 +661,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("straight_line_across_the_step", "order-before-impacts", "or answer between two steps at the order of the"),
         ("lists_speeds_by_differences", "velocity", "not a slope of r from one of them to the next"),
         ("lists_in_pairs", "piecewise", "of an odd number of slices, in none of"),
-        ("closed_form_rest_of_the_step", "piecewise", "steps without an impact have a higher order"),
         ("object_answers_along_the_tangent", "piecewise", "must know of an impact on its way"),
-        ("adams_not_begun_again", "piecewise", "look at the rest of a step with an impact, and what is kept over it"),
-        ("taylor8_last_eighth", "piecewise", "look at where in a step they are searched for"),
-        ("taylor_2_last_to_let_go", "piecewise", "look at when a slice at rest is let go"),
-        ("ssp3_located_speed_before_the_step", "piecewise", "steps without an impact have a higher order"),
         ("unit_vector_unwraps_between_outputs", "angle", "theta is off by whole turns"),
         ("spins_one_way_released_at_first_output", "angle", "the flight begins at t = 0, not at the first"),
         ("remembered_in_any_order", "inputs", "with another order of the start"),
@@ -678,9 +671,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("taylor_speed_after", "definitions", "off by 0.5 of the largest speed_before"),
         ("taylor_sorts_start", "inputs", "slices keep the order of ask.start"),
         ("dense853_reads_past_event", "piecewise", "m beyond an end: an answer between two steps must know of"),
-        ("by_angle_points_to_the_end", "piecewise", "slices go on to half their height beyond an end"),
         ("dense853_mean_of_water", "piecewise", "against mean(v), the mean velocity of the water, instead of v_CM"),
-        ("adams_pece_stale_rate", "piecewise", "look at what the first step after an impact takes from before it"),
         ("adams_pece_last_impact_first", "piecewise", "whether the earliest of several comes first"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
@@ -696,6 +687,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
                 ("opposite_hits_cancel", "elsewhere", "slices strike both ends at one"),
                 ("momenta_tube_turns_about_middle", "piecewise", "within a step theta advances with a J in which"),
                 ("momenta_spares_the_resting", "piecewise", "look at the part of slices at rest in the impact of"),
+                ("taylor8_last_eighth", "piecewise", "look at where in a step they are searched for"),
                 ("printed_loses_rest_of_step", "piecewise", "look at the clock, and at the rest of a step"),
             )
         ),
@@ -706,6 +698,29 @@ def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, 
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
     assert advice in result.line
+
+
+@pytest.mark.parametrize(
+    ("mistake", "piece", "words"),
+    [
+        ("by_angle_points_to_the_end", 0, "slices go on to half their height beyond an end"),
+        ("halving_drag_of_momentum", 0, "x the drag alpha v_CM / m besides"),
+        ("flight_ends_at_half_a_second", 1, "the answer stands still there, first at t = 0.5"),
+        ("adams_not_begun_again", 1, "look at the rest of a step with an impact, and what is kept over it"),
+        ("ssp3_located_speed_before_the_step", 2, "steps without an impact have a higher order"),
+        ("adaptive_cap_rebound_put_on_base", 2, "with an impact on the cap, in none of"),
+        ("adams_pece_stale_rate", 2, "look at what the first step after an impact takes from before it"),
+        ("rest_of_step_lost", 2, "look at the clock, and at the rest of a step"),
+        ("closed_form_rest_of_the_step", 2, "steps without an impact have a higher order"),
+        ("taylor_2_last_to_let_go", 4, "look at when a slice at rest is let go"),
+    ],
+)
+def test_one_throw_tells_where_the_mistake_is(mistake, piece, words):
+    """What ``piecewise`` says of five throws, from the one of them that shows the mistake."""
+    solver = next(mistakes[mistake] for mistakes in LISTS.values() if mistake in mistakes).solver()
+    runner = InProcess(solver, mistake)
+    equation = name_of(switches_of(runner.traits.equation))
+    assert words in " / ".join(drive(departing(runner.traits, equation, [PIECES[piece].ask(0)]), runner))
 
 
 def test_what_is_answered_far_from_the_ends_alone_points_to_rests():
