@@ -1,6 +1,5 @@
 """Does it stand: aims, scatter, shares, the sweep of throws, and what the commands say."""
 
-import json
 import math
 import shutil
 import sqlite3
@@ -15,7 +14,7 @@ from matplotlib.collections import QuadMesh
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
 from flipproof.chapters.landing.chapter import chunks, claims
-from flipproof.chapters.landing.figures import figure_map, figures, map_csv, page, shares_csv, witnesses
+from flipproof.chapters.landing.figures import figure_map, figures, map_csv, page, shares_csv
 from flipproof.chapters.landing.single import describe, land_throw
 from flipproof.chapters.landing.study import (
     AIMING,
@@ -380,13 +379,12 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
             assert "e_table = 0.3" in finding.note
             assert "scatter 5 %" in finding.note
     exhibits = drawn(figures(found), SerialExecutor(), png=False)
-    assert len({exhibit.name for exhibit in exhibits}) == len(exhibits) == 6
+    assert len({exhibit.name for exhibit in exhibits}) == len(exhibits) == 5
     for exhibit in exhibits:
         assert exhibit.drawing.svg.startswith("<?xml")
         assert exhibit.alt
         assert exhibit.table
-        if exhibit.name != "landing-witnesses":
-            assert "ssumed: e_table = 0.3" in exhibit.caption
+        assert "ssumed: e_table = 0.3" in exhibit.caption
     assert shares_csv(found).count("\n") == len(found.cells) + 1
     ((family, fills, rows),) = page(found)["shares"]
     assert family == "family B: time of flight as thrown"
@@ -433,18 +431,6 @@ def test_the_distance_between_the_laws_has_an_interval_and_says_which(found):
     assert "at filling 0.4, water, in turn minus water, together" in finding.note
 
 
-def test_the_stored_witnesses_are_enough_and_agree(found):
-    stored = witnesses()
-    assert stored["touches"] >= 200
-    assert [case["law"] for case in stored["cases"]] == [None, "together", "in-turn"]
-    assert {case["dt"] for case in stored["cases"]} == {None}  # the engines' own steps
-    of_witnesses = [finding for finding in claims(found) if finding.id.startswith("landing-witnesses")]
-    assert len(of_witnesses) == 3
-    for finding in of_witnesses:
-        assert finding.verdict == "pass"
-        assert "reached" in finding.note
-
-
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory):
     """Return the folder of a study that a worker process made, what it said on the way, and its last words."""
@@ -466,7 +452,7 @@ def test_the_sweep_makes_the_same(found, swept):
     assert "P(upright), family B" in words
     assert said[0].startswith("aims: ")
     assert (out / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
-    assert len(list(out.glob("*.svg"))) == len(list(out.glob("*.png"))) == 6
+    assert len(list(out.glob("*.svg"))) == len(list(out.glob("*.png"))) == 5
 
 
 def test_the_sweep_goes_on(found, copied):
@@ -589,8 +575,3 @@ def test_frozen_throws_are_not_counted_twice(tmp_path, capsys):
     file.write_text("[scenario]\nfrozen = true\n", encoding="utf-8")
     assert main(["upright", str(file), "--out", str(tmp_path / "x")]) == 2
     assert "scenario.frozen = true: the study throws water and ice beside it" in capsys.readouterr().err
-
-
-def test_the_stored_matrices_are_json_with_their_command():
-    stored = json.loads(json.dumps(dict(witnesses())))
-    assert stored["command"].startswith("python benchmarks/landing_witnesses.py")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from itertools import accumulate, groupby
-from typing import Any, Final
+from typing import Final
 
-from flipproof.chapters.landing.figures import figures, page, witnesses
+from flipproof.chapters.landing.figures import figures, page
 from flipproof.chapters.landing.study import (
     KINDS,
     OPTIMAL,
@@ -65,7 +65,6 @@ def claims(results: LandingStudy) -> Iterator[Finding]:
     yield _bounces(results)
     yield _model_uncertainty(results)
     yield _undecided(results)
-    yield from _witnesses(witnesses())
 
 
 def _water_and_ice(results: LandingStudy) -> Iterator[Finding]:
@@ -161,20 +160,6 @@ def _undecided(results: LandingStudy) -> Finding:
     if results.throw.with_slices(REFERENCE.n_slices) != REFERENCE:
         return observed(name, title, unknown / throws, note=note)
     return regression(name, title, unknown / throws, "", (0.0, 0.01), note)
-
-
-def _witnesses(stored: Mapping[str, Any]) -> Iterator[Finding]:
-    """Yield in how many touches two programs of one law differ, rods and ice."""
-    for case, matrix in [(entry, matrix) for entry in stored["cases"] for matrix in entry["matrices"]]:
-        (first, second), differ, both = matrix["programs"], matrix["differ"], matrix["decided by both"]
-        kind = "ice" if case["law"] is None else f"water-{case['law']}"
-        max_share = 0.03
-        title = f"Share of touches from which {first} and {second} differ in outcome: {kind.replace('-', ', ')}"
-        note = f"{differ} of {both} that both decide; at most {max_share:.0%} is required: "
-        share = differ / both if both else None
-        reached = share is not None and share <= max_share
-        note += f"{'reached' if reached else 'missed'}; stored, made by: {stored['command']}"
-        yield regression(f"landing-witnesses-{kind}-{first}-{second}", title, share, "", (0.0, max_share), note)
 
 
 def _interval(

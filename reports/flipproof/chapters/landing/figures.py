@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from importlib import resources
 from typing import Any, Final
 
 import numpy as np
@@ -31,12 +29,6 @@ SHADES: Final = {
     "upright": "#0072B2", "lying": "#E8E2D4", "cap": "#E69F00", "undecided": "#CC79A7", "missed": "#FFFFFF"
 }  # fmt: skip
 """Colour of every outcome on the map; water and ice alike."""
-
-
-def witnesses() -> Mapping[str, Any]:
-    """Return the stored matrices of programs that landed the same touches, with the command that made them."""
-    text = resources.files("flipproof.chapters.landing").joinpath("witnesses.json").read_text(encoding="utf-8")
-    return dict(json.loads(text))
 
 
 def figures(results: LandingStudy) -> list[Exhibit]:
@@ -108,7 +100,6 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             figure_energy,
             energies_csv(results),
         ),
-        _witness_figure(witnesses()),
     ]
 
 
@@ -121,27 +112,6 @@ def _energy_words(results: LandingStudy) -> str:
             stand = sum(run.outcome == "upright" for run in runs)
             words.append(f"{kind}: {len(runs)} landings, {stand} upright, {start:.1f} E_s after the first impact")
     return "; ".join(words)
-
-
-def _witness_figure(stored: Mapping[str, Any]) -> Exhibit:
-    words = []
-    for case in stored["cases"]:
-        kind = "ice" if case["law"] is None else f"water, {case['slices']}, {case['law']}"
-        for matrix in case["matrices"]:
-            first, second = matrix["programs"]
-            words.append(f"{kind}, {first} and {second}: {matrix['differ']} of {matrix['decided by both']} differ")
-    return Exhibit(
-        name="landing-witnesses",
-        title="Programs that share no formula, from the same touches",
-        caption=f"Two programs land the same {stored['touches']} touches, {stored['n_slices']} slices at filling "
-        f"{stored['cases'][0]['filling']:g}. Each matrix counts the touches by their outcome in the program "
-        "that stands beside it (rows) and in the one below it (columns); in red the two differ. "
-        f"The counts are stored with this program; this command made them: {stored['command']}",
-        alt="; ".join(words),
-        maker=figure_witnesses,
-        data=(stored["cases"],),
-        table=witnesses_csv(stored),
-    )
 
 
 @styled
@@ -256,33 +226,6 @@ def figure_energy(results: LandingStudy) -> Figure:
     return figure
 
 
-@styled
-def figure_witnesses(cases: Sequence[Mapping[str, Any]]) -> Figure:
-    """Outcomes of two programs from one touch, a matrix for each pair and law."""
-    matrices = [(case, matrix) for case in cases for matrix in case["matrices"]]
-    columns = 3
-    rows = -(-len(matrices) // columns)
-    figure, panels = new_figure(rows, columns, size=(8.6, 2.3 * rows), squeeze=False)
-    names = ("upright", "lying", "cap", "undecided")
-    for axes in panels.ravel()[len(matrices) :]:
-        axes.set_axis_off()
-    for axes, (case, matrix) in zip(panels.ravel(), matrices, strict=False):
-        counts = np.array([[matrix["outcomes"].get(f"{first}/{second}", 0) for second in names] for first in names])
-        axes.imshow(np.sqrt(counts), cmap="Blues", vmin=0.0, vmax=1.6 * math.sqrt(matrix["touches"]))
-        for (row, column), count in np.ndenumerate(counts):
-            if count:
-                colour = "#B00020" if row != column else "black"
-                axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color=colour)
-        axes.set_xticks(range(4), names, fontsize=8, rotation=90)
-        axes.set_yticks(range(4), names, fontsize=8)
-        axes.grid(visible=False)
-        kind = "ice" if case["law"] is None else f"water, {case['law']}\nslices {case['slices']}"
-        axes.set_title(kind, fontsize=8)
-        axes.set_ylabel(matrix["programs"][0], fontsize=8)
-        axes.set_xlabel(matrix["programs"][1], fontsize=8)
-    return figure
-
-
 def shares_csv(results: LandingStudy) -> str:
     """Return one row for each share: what was thrown, the share with its 95 % interval, and means at the touch."""
     rows = [
@@ -334,19 +277,6 @@ def energies_csv(results: LandingStudy) -> str:
         for t, e in zip(run.t.tolist(), run.energy.tolist(), strict=True)
     ]
     return rows_csv(("landed", "throw", "outcome", "t [s]", "energy [E_s]"), rows, digits=None)
-
-
-def witnesses_csv(stored: Mapping[str, Any]) -> str:
-    """Return how many touches end in which pair of outcomes, for every pair of programs."""
-    rows = [
-        [case["slices"], case["law"], *matrix["programs"], *pair.split("/"), count]
-        for case in stored["cases"]
-        for matrix in case["matrices"]
-        for pair, count in matrix["outcomes"].items()
-    ]
-    return rows_csv(
-        ("slices", "law", "first", "second", "outcome of first", "outcome of second", "touches"), rows, digits=None
-    )
 
 
 def share_line(results: LandingStudy, family: str) -> str:
