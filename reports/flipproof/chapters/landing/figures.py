@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Kind, LandingStudy
+from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, Cell, Kind, LandingStudy
 from flipproof.chapters.landing.throws import FAMILIES
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.columns import rows_csv
@@ -77,41 +77,7 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             figure_axes,
             shares_csv(results),
         ),
-        exhibit(
-            "landing-static",
-            "Where the static criterion is right and wrong",
-            "The toppling angle of Eq. 13a, with the water where it is at the touch, says whether a bottle put "
-            "down at rest would end upright. Each bar is the share of throws that do end upright, at all fillings: "
-            "of those that the angle calls upright, and of the others.",
-            "; ".join(
-                f"family {family}, {kind}: {below.upright} of {below.throws} called upright stand, {above.upright} of "
-                f"{above.throws} others"
-                for (family, kind), (below, above) in results.static.items()
-            ),
-            figure_static,
-            static_csv(results),
-        ),
-        exhibit(
-            "landing-energy",
-            "Energy against the saddle",
-            f"The same throwers with water and with ice, filling {size.axis_filling:g}. Below 1 the bottle has "
-            "too little energy to tip from the base over a rim, and the outcome is final.",
-            _energy_words(results),
-            figure_energy,
-            energies_csv(results),
-        ),
     ]
-
-
-def _energy_words(results: LandingStudy) -> str:
-    words = []
-    for kind in WATER_AND_ICE:
-        runs = [run for run in results.energies if run.kind == kind]
-        if runs:
-            start = sum(float(run.energy[0]) for run in runs) / len(runs)
-            stand = sum(run.outcome == "upright" for run in runs)
-            words.append(f"{kind}: {len(runs)} landings, {stand} upright, {start:.1f} E_s after the first impact")
-    return "; ".join(words)
 
 
 @styled
@@ -185,47 +151,6 @@ def figure_map(results: LandingStudy) -> Figure:
     return figure
 
 
-@styled
-def figure_static(results: LandingStudy) -> Figure:
-    """Of the throws that the static criterion calls upright, and of those it does not, the share that stands."""
-    names = [name for name, (below, above) in results.static.items() if below.throws + above.throws]
-    figure, axes = new_figure(size=(8.6, 3.9))
-    width = 0.38
-    looks = (("#0072B2", "tilt below the toppling angle at touch"), ("#D55E00", "tilt above it"))
-    for side, (colour, label) in enumerate(looks):
-        for k, name in enumerate(names):
-            share = results.static[name][side]
-            height = share.upright / share.throws if share.throws else 0.0
-            bar = axes.bar(k + (side - 0.5) * width, height, width, color=colour, label=label if k == 0 else None)
-            axes.bar_label(bar, [f"{share.upright} of {share.throws}"], fontsize=7.5, padding=2)
-    axes.set_xticks(range(len(names)), [f"{KINDS[kind].words}\nfamily {family}" for family, kind in names], fontsize=8)
-    axes.set(ylim=(0.0, 1.1), ylabel="share that stands [1]")
-    shared_legend(figure, axes, columns=2)
-    return figure
-
-
-@styled
-def figure_energy(results: LandingStudy) -> Figure:
-    """Energy of a few landings over the saddle: below 1 the outcome is final."""
-    figure, panels = new_figure(1, 2, size=(8.6, 4.0), sharey=True)
-    fallen = "#B08D57"
-    for axes, kind in zip(panels, WATER_AND_ICE, strict=True):
-        for run in results.energies:
-            if run.kind == kind:
-                colour = SHADES["upright"] if run.outcome == "upright" else fallen
-                axes.plot(run.t, np.minimum(run.energy, 8.0), color=colour, linewidth=1.1, alpha=0.85)
-        axes.axhline(1.0, color="black", linewidth=1.2)
-        axes.set_title(KINDS[kind].words, fontsize=10, loc="left")
-        axes.set(xlabel="time from the touch [s]", ylim=(0.4, 4.0))
-        axes.margins(x=0.0)
-    panels[0].set_ylabel("energy over the table / saddle E_s [1]")
-    handles = [Line2D([], [], color=SHADES["upright"], label="ends upright")]
-    handles += [Line2D([], [], color=fallen, label="ends lying or on the cap")]
-    handles += [Line2D([], [], color="black", label="saddle: below it the outcome is final")]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    return figure
-
-
 def shares_csv(results: LandingStudy) -> str:
     """Return one row for each share: what was thrown, the share with its 95 % interval, and means at the touch."""
     rows = [
@@ -256,27 +181,6 @@ def map_csv(results: LandingStudy) -> str:
     return rows_csv(
         ("fill_fraction [1]", "omega0 [rad/s]", "landed", "outcome", "theta at touch [degrees]"), rows, digits=None
     )
-
-
-def static_csv(results: LandingStudy) -> str:
-    """Return how often the static criterion and the outcome agree."""
-    rows = [
-        [family, KINDS[kind].words, below, upright, count]
-        for (family, kind), shares in results.static.items()
-        for below, share in zip(("yes", "no"), shares, strict=True)
-        for upright, count in (("yes", share.upright), ("no", share.throws - share.upright))
-    ]
-    return rows_csv(("family", "landed", "tilt below toppling angle at touch", "upright", "throws"), rows, digits=None)
-
-
-def energies_csv(results: LandingStudy) -> str:
-    """Return the energies that are drawn."""
-    rows = [
-        [KINDS[run.kind].words, k, run.outcome, t, e]
-        for k, run in enumerate(results.energies)
-        for t, e in zip(run.t.tolist(), run.energy.tolist(), strict=True)
-    ]
-    return rows_csv(("landed", "throw", "outcome", "t [s]", "energy [E_s]"), rows, digits=None)
 
 
 def share_line(results: LandingStudy, family: str) -> str:

@@ -10,17 +10,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice, product
+from itertools import product
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.chapters.landing.throws import SPARE, Aim, Case, Scatter, Share, Throws, Z, aimed, correlation
+from flipproof.chapters.landing.throws import SPARE, Aim, Case, Scatter, Share, Z, aimed, correlation
 from flipproof.chapters.landing.work import Landed
-from ode_reference import fly
-from ode_reference.landing.land import path
-from slicemodel import Scenario, Table
+from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass_at_rest
 from slicemodel.trajectory import FloatArray
 
@@ -154,16 +152,6 @@ class Outcomes:
     theta: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class Energy:
-    """Energy over the table of one landing, share of its saddle, at times from the touch [s]; and how it ends."""
-
-    kind: Kind
-    t: FloatArray
-    energy: FloatArray
-    outcome: str
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandingStudy:
     """What the study found.
@@ -174,7 +162,6 @@ class LandingStudy:
     cells : by key - shares over the filling and along the axes
     maps : by kind - outcomes over ``size.map_axes``
     static : (family, kind) -> shares upright of what the static criterion calls upright and of the others, all fillings
-    energies : of a few throws at the filling of the axes
     unaimed : (family, filling, frozen) -> why no aim was found
     """
 
@@ -183,7 +170,6 @@ class LandingStudy:
     cells: Mapping[Key, Cell]
     maps: Mapping[Kind, Outcomes]
     static: Mapping[tuple[str, Kind], tuple[Share, Share]]
-    energies: tuple[Energy, ...]
     unaimed: Mapping[Place, str]
 
     def along(self, axis: str, kind: Kind, family: str | None = None) -> list[tuple[float, Cell]]:
@@ -349,7 +335,6 @@ def read(throw: Scenario, size: Size, cases: Cases, rows: Rows, unaimed: Mapping
         cells=cells,
         maps=maps,
         static={name: (share_of(below), share_of(above)) for name, (below, above) in sorts.items()},
-        energies=tuple(energy for kind in WATER_AND_ICE for energy in _energies(kind, cases, rows, size)),
         unaimed=unaimed,
     )
 
@@ -373,19 +358,3 @@ def cell_of(aim: Aim, rows: Sequence[Landed]) -> Cell:
         bounces=mean("bounces"),
         bounces_band=Z * float(np.std(bounces, ddof=1)) / math.sqrt(len(bounces)) if len(bounces) > 1 else math.nan,
     )
-
-
-def _energies(kind: Kind, cases: Cases, rows: Rows, size: Size) -> list[Energy]:
-    """Follow the energy of the first ten throws counted at the filling of the axes."""
-    key = Key("filling", size.axis_filling, size.families[-1], size.axis_filling, kind, size.cuts[0])
-    if key not in cases:
-        return []
-    case, throws = cases[key], rows[list(cases).index(key)]
-    design = Throws(cases=(case,), seed=size.seed)
-    table = Table(height=case.aim.height, restitution=case.restitution, friction=case.friction)
-    energies = []
-    for place, row in enumerate(islice(throws, 10)):
-        if row.outcome not in (None, "undecided"):
-            run = path(fly(design.thrown(case, place), table), table, case.law, duration=0.45)
-            energies.append(Energy(kind, run.t, run.energy / run.saddle, str(row.outcome)))
-    return energies
