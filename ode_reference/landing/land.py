@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -41,31 +40,6 @@ IMMOBILE: Final = 1e-12
 
 MISPLACED: Final = 1e-9
 """How far a slice of a touch may lie beyond its stops [L]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Path:
-    """The motion of a landing.
-
-    Parameters
-    ----------
-    t : (P,) - from the touch [s]
-    centre, velocity : (P, 2) - of the middle of the tube, x from the touch and y over the table [m], [m/s]
-    theta : (P,) [rad], omega : (P,) [rad/s]
-    r, v : (P, N) - slices from the cap [m] and their velocities in the bottle [m/s]
-    energy : (P,) - over the table [J]
-    saddle : float - E_s [J]
-    """
-
-    t: FloatArray
-    centre: FloatArray
-    theta: FloatArray
-    velocity: FloatArray
-    omega: FloatArray
-    r: FloatArray
-    v: FloatArray
-    energy: FloatArray
-    saddle: float
 
 
 def land(
@@ -212,48 +186,6 @@ def _run(touch: Touch, world: World, dt: float) -> Landing:
     none = np.empty((0, 7 + 2 * world.n))
     run: Landing = loop.land(q, s, w, dt, LONGEST_LANDING, False, world, 1.0, none)
     return run
-
-
-def path(
-    touch: Touch,
-    table: Table,
-    law: str | None = None,
-    *,
-    dt: float = DEFAULT_DT,
-    every: float = 1e-3,
-    duration: float = 0.5,
-    drop: float = 0.0,
-) -> Path:
-    """Return the motion of a landing, past its certificate; parameters as for ``land``.
-
-    ``every`` is the time between two instants, at most ``dt`` late, ``duration`` the whole [s]; the touch may be lifted
-    by ``drop`` [m] first.
-    """
-    from ode_reference.landing import loop, motion
-
-    # Without a saddle nothing ends the run before its time.
-    world = world_of(touch, table, _law(touch.scenario, law))
-    q, s, w = state_of(touch, world)
-    q[1] += drop
-    record = np.full((math.ceil(duration / every), 7 + 2 * world.n), np.nan)
-    loop.land(q, s, w, dt, duration, False, world._replace(saddle=-math.inf, cap_saddle=-math.inf), every, record)
-    record = record[np.isfinite(record[:, 0])]
-    n = world.n
-    energy = [
-        motion.energy(row[1:7], row[7 : 7 + n], row[7 + n :], math.sin(row[3]), math.cos(row[3]), world)
-        for row in record
-    ]
-    return Path(
-        t=record[:, 0],
-        centre=record[:, 1:3],
-        theta=record[:, 3],
-        velocity=record[:, 4:6],
-        omega=record[:, 6],
-        r=record[:, 7 : 7 + n] + world.half,
-        v=record[:, 7 + n :],
-        energy=np.array(energy),
-        saddle=world.saddle,
-    )
 
 
 def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, object]) -> Outcome:

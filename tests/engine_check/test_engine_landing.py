@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from landing_forms import at_rest
+from landing_path import path
 
 import engine_check
 import ode_reference
 from engine_check import landing
 from engine_check.landing import ALMOST_CLOSED, Run, Watch, World, landed
-from ode_reference.landing.land import path, world_of
+from ode_reference.landing.land import world_of
 from slicemodel import Bottle, Scenario, Table, Touch
 
 WATER = Scenario(n_slices=6, drag=0.0, water_mass=0.4)

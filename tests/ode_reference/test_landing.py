@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 import rods_by_events
 from landing_forms import Block, at_rest, corner_ratio, ends_upright
+from landing_path import path
 from scipy.integrate import quad
 from touches import touch
 
 import engine_check
 import ode_reference
-from ode_reference.landing.land import path, world_of
+from ode_reference.landing.land import world_of
 from slicemodel import Bottle, Scenario, ScenarioError, Table
 from slicemodel.observables import static_toppling_angle
 
