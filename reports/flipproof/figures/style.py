@@ -139,6 +139,27 @@ def new_figure(
     return figure, figure.subplots(rows, columns, **options)
 
 
+def new_panels(
+    count: int, columns: int, x: str, y: str, *, head: float, height: float, common: bool = True
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of ``count`` panels, ``columns`` a row, labelled at the left and under the lowest of each column.
+
+    A row is ``height`` inches high, what is not panels ``head``; ``common`` says that all have the same axes.
+    """
+    rows = -(-count // columns)
+    size = (8.0, head + height * rows)
+    figure, grid = new_figure(rows, columns, size=size, sharex=common, sharey=common, squeeze=False)
+    panels, spare = list(grid.flat)[:count], list(grid.flat)[count:]
+    for axes in spare:
+        axes.remove()
+    for axes in grid[:, 0]:
+        axes.set_ylabel(y)
+    for axes in panels[-columns:]:
+        axes.set_xlabel(x)
+        axes.tick_params(labelbottom=True)
+    return figure, panels
+
+
 def shared_legend(figure: Figure, axes: Axes, columns: int = 3) -> None:
     """Put one legend for all panels below the figure, from the entries of ``axes``."""
     handles, labels = axes.get_legend_handles_labels()

@@ -16,7 +16,7 @@ from engine_check.engines import ENGINES
 from flipproof.chapters.differences.study import PARTING_BAND, Difference, percent, study_difference
 from flipproof.chapters.solvers import ENGINE, FREE, LIMITS, SCHEMES, UNREFINED, WITNESSES, Guest
 from flipproof.figures.spoken import spoken
-from flipproof.figures.style import new_figure, styled
+from flipproof.figures.style import new_panels, styled
 from flipproof.frame.chapter import (
     Absent,
     Ask,
@@ -232,11 +232,9 @@ def figures(results: Differences) -> Iterator[Exhibit]:
 @styled
 def draw(differences: Sequence[Difference]) -> Figure:
     """Draw a panel a pair on one logarithmic scale, with the parting band and when it is first passed."""
-    columns, line, limit = 3, "#0072B2", "#B00020"
-    rows = -(-len(differences) // columns)
-    size = (8.0, 0.5 + 1.75 * rows)
-    figure, grid = new_figure(rows, columns, size=size, sharex=True, sharey=True, squeeze=False)
-    for axes, difference in zip(grid.flat, differences, strict=False):
+    line, limit = "#0072B2", "#B00020"
+    figure, panels = new_panels(len(differences), 3, "time t [s]", "|difference| [1]", head=0.5, height=1.75)
+    for axes, difference in zip(panels, differences, strict=True):
         axes.plot(difference.t, np.maximum(np.abs(difference.omega), AXIS_MIN / 10), color=line, linewidth=1.2)
         axes.axhline(PARTING_BAND, color=limit, linewidth=1.0, linestyle=":")
         if difference.parting_time is not None:
@@ -244,15 +242,7 @@ def draw(differences: Sequence[Difference]) -> Figure:
         words = f"{textwrap.fill(difference.name, 32)}\nat most {percent(difference.largest)}"
         axes.set_title(words, fontsize=9, loc="left")
         axes.margins(x=0.02)
-    for axes in grid.flat[len(differences) :]:
-        axes.remove()
-    grid[0, 0].set(yscale="log", ylim=(AXIS_MIN, AXIS_MAX))
-    for axes in grid[:, 0]:
-        axes.set_ylabel("|difference| [1]")
-    # The lowest panel of every column.
-    for axes in grid.flat[max(len(differences) - columns, 0) : len(differences)]:
-        axes.set_xlabel("time t [s]")
-        axes.tick_params(labelbottom=True)
+    panels[0].set(yscale="log", ylim=(AXIS_MIN, AXIS_MAX))
     return figure
 
 

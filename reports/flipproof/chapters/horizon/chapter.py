@@ -26,7 +26,7 @@ from matplotlib.lines import Line2D
 from engine_check.engines import ENGINES
 from flipproof.chapters.solvers import ENGINE, FREE
 from flipproof.curves.ensemble import Ensemble
-from flipproof.figures.style import new_figure, solver_style, styled
+from flipproof.figures.style import new_panels, solver_style, styled
 from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Study, observed, regression
 from flipproof.frame.columns import curves_csv
 from flipproof.frame.flights import Flights, attempt
@@ -262,29 +262,21 @@ def figures(results: tuple[Horizon, ...]) -> Iterator[Exhibit]:
 @styled
 def figure_horizon(studies: Sequence[Horizon]) -> Figure:
     """Width of every ensemble over time, a panel a solver and throw; a point where it leaves the band."""
-    red, columns = "#B00020", min(3, len(studies))
-    rows = -(-len(studies) // columns)
-    size = (8.0, 1.2 + 2.6 * rows)
-    figure, grid = new_figure(rows, columns, size=size, sharex=True, sharey=True, squeeze=False)
+    red = "#B00020"
+    labels = "time t [s]", "width of ω / ω₀ [1]"
+    figure, panels = new_panels(len(studies), min(3, len(studies)), *labels, head=1.2, height=2.6)
     sizes = sorted({level.size for study in studies for level, _ in study.ensembles if level.kind != "order"})
     lines: dict[float, Any] = dict(zip(sizes, cycle(LINES), strict=False))
-    for axes, study in zip(grid.flat, studies, strict=False):
+    for axes, study in zip(panels, studies, strict=True):
         axes.axhline(BAND, color=red, linewidth=1.2, linestyle=":")
         axes.set_yscale("log")
         axes.margins(x=0.01)
         _draw_widths(axes, study, lines, solver_style(study.solver)["color"])
         axes.set_title(study.name, fontsize=10, loc="left")
-    for axes in grid.flat[len(studies) :]:
-        axes.remove()
     top = [
         ensemble.width[np.isfinite(ensemble.width)].max(initial=BAND) for s in studies for _, ensemble in s.ensembles
     ]
-    grid[0, 0].set_ylim(MIN_WIDTH / 3, 10 * max(top))
-    for axes in grid[:, 0]:
-        axes.set_ylabel("width of ω / ω₀ [1]")
-    for axes in grid.flat[max(len(studies) - columns, 0) : len(studies)]:
-        axes.set_xlabel("time t [s]")
-        axes.tick_params(labelbottom=True)
+    panels[0].set_ylim(MIN_WIDTH / 3, 10 * max(top))
     entry = partial(Line2D, [], [], color="#444444")
     handles = [entry(linestyle=line, label=f"change of {size:.0e}") for size, line in lines.items()]
     handles += [

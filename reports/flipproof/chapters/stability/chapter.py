@@ -22,7 +22,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from flipproof.chapters.maps.study import vary
 from flipproof.curves.ensemble import largest_change
-from flipproof.figures.style import new_figure, styled
+from flipproof.figures.style import new_panels, styled
 from flipproof.frame.chapter import Ask, Band, Chapter, Claims, Exhibit, Finding, Study, attempt, observed, regression
 from flipproof.frame.columns import rows_csv
 from flipproof.frame.flights import Flights
@@ -284,18 +284,11 @@ def figures(panels: Sequence[Panel]) -> Iterator[Exhibit]:
 @styled
 def figure_stability(panels: Sequence[Panel]) -> Figure:
     """Grades over step and iterations, one panel per bottle: colour, sign and number in every cell."""
-    columns = min(2, len(panels))
-    rows = -(-len(panels) // columns)
-    height = 1.2 + rows * (1.0 + 0.4 * len(panels[0].layout.iterations))
-    figure, axes = new_figure(rows, columns, size=(8.0, height), squeeze=False)
-    for at, panel in zip(axes.flat, panels, strict=False):
-        _draw_panel(at, panel)
-    for at in axes.flat[len(panels) :]:
-        at.set_visible(False)
-    for at in axes[:, 0]:
-        at.set_ylabel("iterations per step [1]")
-    for at in axes[-1, :]:
-        at.set_xlabel("step Δt [ms], finer to the right")
+    height = 1.0 + 0.4 * len(panels[0].layout.iterations)
+    labels = "step Δt [ms], finer to the right", "iterations per step [1]"
+    figure, drawn = new_panels(len(panels), min(2, len(panels)), *labels, head=1.2, height=height, common=False)
+    for axes, panel in zip(drawn, panels, strict=True):
+        _draw_panel(axes, panel)
     graded = [look for grade, look in LOOKS.items() if any(panel.counts[grade] for panel in panels)]
     line = partial(Line2D, [], [], color="black")
     handles = [

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flipproof.chapters.work_precision.study import Curve, WorkPrecision
-from flipproof.figures.style import EXTRA_COLOURS, STYLES, new_figure, styled
+from flipproof.figures.style import EXTRA_COLOURS, STYLES, new_panels, styled
 from ode_reference.models import MODELS
 
 COLOURS: Final = {"DOP853": "#000000", "LSODA": "#0050A0", "Radau": "#6A5ACD"}
@@ -27,19 +27,12 @@ HIGHEST: Final = 2.0
 @styled
 def figure_work_precision(study: WorkPrecision) -> Figure:
     """Draw one panel per equation on common axes."""
-    rows = math.ceil(len(study.references) / 2)
-    figure, panels = new_figure(rows, 2, size=(8.0, 0.4 + 2.3 * rows), sharex=True, sharey=True, squeeze=False)
+    labels = "updates of one slice [1]", "max |Δω| / ω₀ [1]"
+    figure, panels = new_panels(len(study.references), 2, *labels, head=0.4, height=2.3)
     floors = [reference.floor for reference in study.references.values() if math.isfinite(reference.floor)]
     bottom = max(1e-14, min([1e-10, *floors]) / 10)
-    for axes, equation in zip(panels.flat, study.references, strict=False):
+    for axes, equation in zip(panels, study.references, strict=True):
         _panel(axes, study, equation, bottom)
-    for spare in list(panels.flat)[len(study.references) :]:
-        spare.set_visible(False)
-    for axes in panels[:, 0]:
-        axes.set_ylabel("max |Δω| / ω₀ [1]")
-    for axes in list(panels.flat)[: len(study.references)][-2:]:
-        axes.set_xlabel("updates of one slice [1]")
-        axes.xaxis.set_tick_params(labelbottom=True)
     return figure
 
 
