@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,6 +14,7 @@ import numpy as np
 from flipproof.frame.beside import beside
 from flipproof.frame.others import OTHERS
 from slicemodel import Scenario, Trajectory
+from slicemodel.observables import plateau
 from slicemodel.scenario import unknown_name
 
 REFERENCE: Final = Scenario().with_slices(50)
@@ -137,9 +139,23 @@ class RunResult:
     @property
     def whole(self) -> Trajectory:
         """The trajectory; raises Missing with the reason if there is none or the run did not reach its end."""
-        if not self.flight.ok:
-            raise Missing(f"{self.run.name}: {self.flight.status}: {self.flight.message}")
+        if self.problem:
+            raise Missing(f"{self.run.name}: {self.problem}")
         return self.flight
+
+    @property
+    def problem(self) -> str:
+        """Why there is no trajectory, or why the run did not reach its end; "" if it did."""
+        run = self.trajectory
+        if run is None:
+            return self.reason
+        return "" if run.ok else f"{run.status}: {run.message}"
+
+    @property
+    def plateau(self) -> float:
+        """Mean of omega / omega_0 over the second half of the flight; NaN if the run did not reach its end."""
+        run = self.trajectory
+        return math.nan if run is None or not run.ok else plateau(run.t, run.omega, run.scenario.omega0)
 
 
 def make(run: Run) -> RunResult:

@@ -19,7 +19,6 @@ from flipproof.frame.solvers import find
 from flipproof.output.motion import motion_data
 from flipproof.output.tables import trajectory_csv
 from slicemodel import Scenario, Trajectory
-from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 
 AXES = {
@@ -85,7 +84,7 @@ def solver_row(name: str, result: RunResult) -> dict[str, Any]:
         "status": run.status,
         "message": run.message,
         "final": float(run.omega[-1] / run.scenario.omega0) if landed else None,
-        "plateau": plateau(run.t, run.omega, run.scenario.omega0) if run.ok else None,
+        "plateau": result.plateau if run.ok else None,
         "impacts": None if run.impacts is None else len(run.impacts),
         "diagnostics": json_ready(run.diagnostics),
     }

@@ -29,7 +29,6 @@ from ode_reference.models import MODELS as EQUATIONS
 from ode_reference.solver import RODS
 from ode_reference.switches import Switches
 from slicemodel import Scenario
-from slicemodel.observables import plateau
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
@@ -261,15 +260,11 @@ def place_of(throw: Scenario, axis: Axis, steps: int) -> tuple[float, float]:
 
 def read_flight(result: RunResult) -> Reading:
     """Return what a map needs of one run."""
-    flight = result.trajectory
-    if flight is None:
-        return Reading(problem=word(result.reason))
-    if not flight.ok:
-        return Reading(problem=flight.status)
+    if result.problem:
+        return Reading(problem=word(result.problem))
+    flight = result.flight
     times = np.linspace(0.0, flight.scenario.duration, CURVE)
-    return Reading(
-        level=plateau(flight.t, flight.omega, flight.scenario.omega0), omega=np.interp(times, flight.t, flight.omega)
-    )
+    return Reading(level=result.plateau, omega=np.interp(times, flight.t, flight.omega))
 
 
 def word(reason: str) -> str:

@@ -21,7 +21,6 @@ from flipproof.frame.chapter import Ask, Chapter, Claims, Exhibit, Finding, Run,
 from flipproof.frame.columns import columns_csv
 from ode_reference.solver import COLUMN, RODS
 from slicemodel import Scenario, Trajectory
-from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 
 ICE: Final = 1.0
@@ -90,24 +89,14 @@ def study_overlap(
     fills: Sequence[float], runs: Mapping[str, Sequence[Run]], results: Mapping[Run, RunResult]
 ) -> Overlap:
     """Read the runs that ``plan_overlap`` planned over these fill fractions."""
-
-    def read(result: RunResult) -> tuple[float, str]:
-        """Return the plateau of a run, or NaN and why it cannot be used."""
-        flight = result.trajectory
-        if flight is None:
-            return np.nan, result.reason
-        if not flight.ok:
-            return np.nan, f"{flight.status}: {flight.message}"
-        return plateau(flight.t, flight.omega, flight.scenario.omega0), ""
-
-    readings = {name: list(zip(*(read(results[run]) for run in curve), strict=True)) for name, curve in runs.items()}
-    level = {name: np.array(readings[name][0]) for name in (PASS, EXCLUDE, CHECK, COLUMN, RODS)}
+    levels = {name: np.array([results[run].plateau for run in curve]) for name, curve in runs.items()}
+    level = {name: levels[name] for name in (PASS, EXCLUDE, CHECK, COLUMN, RODS)}
     return Overlap(
         fills=np.asarray(fills),
         throw=runs[PASS][0].scenario,
         level=level,
-        reason={name: list(readings[name][1]) for name in level},
-        band=2.0 * np.abs(level[EXCLUDE] - readings[COARSER][0]),
+        reason={name: [results[run].problem for run in runs[name]] for name in level},
+        band=2.0 * np.abs(level[EXCLUDE] - levels[COARSER]),
     )
 
 

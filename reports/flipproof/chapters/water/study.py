@@ -15,7 +15,6 @@ from flipproof.chapters.maps.study import vary
 from flipproof.figures.spoken import SPOKEN
 from flipproof.frame.chapter import Ask, Run, RunResult, Study
 from ode_reference.solver import COLUMN, RODS
-from slicemodel.observables import plateau
 from slicemodel.trajectory import FloatArray
 
 FILLS: Final = (0.05, 0.1, 0.15, 0.2, 0.25, 0.33, 0.4, 0.5, 0.6, 0.75, 0.9, 1.0)
@@ -160,17 +159,16 @@ def study(ask: Ask) -> Study[Water]:
         for counted in (False, True)
     }
     flights = yield [*runs.values(), *half.values()]
-    level, early = (
-        {equation: np.array([read(flights[runs[equation, fill]]) for fill in FILLS]) for equation in EQUATIONS}
-        for read in (_level, _early)
-    )
+    flown = {equation: [flights[runs[equation, fill]] for fill in FILLS] for equation in EQUATIONS}
+    level = {equation: np.array([result.plateau for result in results]) for equation, results in flown.items()}
+    early = {equation: np.array([_early(result) for result in results]) for equation, results in flown.items()}
     apart = {
         equation: {
             fill: _apart(flights[runs[equation, fill]], flight["omega"]) for fill, flight in late_fluid().items()
         }
         for equation in EQUATIONS
     }
-    inertia_change = {name: _level(flights[half[name, True]]) - _level(flights[half[name, False]]) for name, _ in half}
+    inertia_change = {name: flights[half[name, True]].plateau - flights[half[name, False]].plateau for name, _ in half}
     return Water(slices=cut.n_slices, level=level, early=early, apart=apart, own_inertia=inertia_change)
 
 
@@ -187,11 +185,6 @@ def _run(equation: str, filling: float, ask: Ask) -> Run:
     if equation == "published-python":
         return Run(equation, throw, {"steps": ask.steps, "store": "summary"}, label)
     return Run(equation, throw, {"times": _times(ask)}, label)
-
-
-def _level(result: RunResult) -> float:
-    run = result.trajectory
-    return float("nan") if run is None or not run.ok else plateau(run.t, run.omega, run.scenario.omega0)
 
 
 def _early(result: RunResult) -> float:
