@@ -27,7 +27,7 @@ from flipproof.curves.events import Matched, jumps, match
 from flipproof.curves.files import Curves
 from flipproof.curves.growth import Growth, first_crossing, fit_growth
 from flipproof.curves.tube import tube_around
-from flipproof.frame.findings import Band, Finding, regression
+from flipproof.frame.findings import Band, Finding, finite_or_none, regression
 from slicemodel.trajectory import FloatArray
 
 SAFETY: Final = 2.0
@@ -239,8 +239,8 @@ class Comparison:
                     "time": float(column.gap.t[column.gap.size.argmax()]),
                     "tolerance": column.tolerance,
                     "horizon": column.horizon,
-                    "growth_rate": _finite(column.growth.rate),
-                    "growth_error": _finite(column.growth.error),
+                    "growth_rate": finite_or_none(column.growth.rate),
+                    "growth_error": finite_or_none(column.growth.error),
                     "last_digit_shows_at": column.last_digit,
                     "times": len(column.gap.t),
                     "compared": int(column.comparable.sum()),
@@ -368,7 +368,3 @@ def _events(first: Curves, second: Curves, columns: Sequence[Column], shift: flo
 
 def _slug(name: str) -> str:
     return "".join(c if c.isascii() and c.isalnum() else "-" for c in name)
-
-
-def _finite(number: float) -> float | None:
-    return number if math.isfinite(number) else None

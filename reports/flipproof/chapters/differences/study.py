@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flipproof.curves.ensemble import difference
 from flipproof.curves.growth import first_crossing
 from slicemodel import Impact, Trajectory
 from slicemodel.trajectory import FloatArray
@@ -80,8 +81,7 @@ def study_difference(
     linearly if its times differ. ``impacts_of`` is the run whose impacts the parting is set against; ``finer`` are the
     same two solvers at more slices.
     """
-    t = first.t[first.t <= min(first.t[-1], second.t[-1])]
-    omega = (np.interp(t, second.t, second.omega) - first.omega[: len(t)]) / first.scenario.omega0
+    t, omega = difference(first, second)
     size = np.abs(omega)
     k = int(size.argmax())
     parting = first_crossing(t, size, PARTING_BAND)

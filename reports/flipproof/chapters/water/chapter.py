@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from flipproof.chapters.water.statements import NAMES, Held, held, standing
@@ -28,6 +27,7 @@ from flipproof.chapters.water.study import (
 from flipproof.figures.style import STYLES, new_figure, shared_legend, styled
 from flipproof.frame.chapter import Chapter, Claims, Exhibit, observed
 from flipproof.frame.columns import columns_csv
+from flipproof.frame.findings import finite_or_none
 from ode_reference.solver import COLUMN, RODS
 from slicemodel.trajectory import FloatArray
 
@@ -81,7 +81,7 @@ def claims(water: Water) -> Claims:
         title = f"{equation}: r.m.s. distance of the plateau from the band of three fluids, fillings from a quarter on"
         misses = ", ".join(f"{water.miss(equation, fill):+.3f} at {fill:g}" for fill in fluids()["fillings"][1:])
         value, slices = (
-            _finite(water.distance(equation)),
+            finite_or_none(water.distance(equation)),
             "" if equation in (DISCS, RODS, COLUMN) else f"N = {water.slices}; ",
         )
         note = f"{slices}{misses}; two fluids recorded, one our own; {EQUATIONS[equation]}"
@@ -90,7 +90,7 @@ def claims(water: Water) -> Claims:
     for equation, change in water.own_inertia.items():
         title = f"{equation}, half full: change of the plateau by the water's own inertia, M_w R²/4 as of discs"
         note = "17 % of J₀ at a quarter to a half; the paper leaves it out by cutting water into points"
-        yield observed(f"water-own-inertia-{equation}", title, _finite(change), "of ω₀", note)
+        yield observed(f"water-own-inertia-{equation}", title, finite_or_none(change), "of ω₀", note)
 
 
 def verdict(water: Water) -> Shown:
@@ -204,9 +204,13 @@ def summary(water: Water) -> dict[str, Any]:
     rows = [
         {
             "name": name,
-            "distance": _finite(water.distance(name)),
+            "distance": finite_or_none(water.distance(name)),
             "fillings": [
-                {"id": f"{f:g}", "plateau": _finite(water.at(name, f)), "miss": _finite(water.miss(name, f))}
+                {
+                    "id": f"{f:g}",
+                    "plateau": finite_or_none(water.at(name, f)),
+                    "miss": finite_or_none(water.miss(name, f)),
+                }
                 for f in wanted
             ],
         }
@@ -214,10 +218,6 @@ def summary(water: Water) -> dict[str, Any]:
     ]
     bands = [{"id": f"{f:g}", "low": float(a), "high": float(b)} for f, a, b in zip(*fluid_band(), strict=True)]
     return {"water": {"equations": rows, "fluids": bands}}
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 CHAPTER: Final = Chapter(
