@@ -34,8 +34,8 @@ class Growth(NamedTuple):
         return f"{'grows' if self.rate > 0 else 'shrinks'} at {abs(self.rate):.1f} ± {self.error:.1f} /s"
 
 
-def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: float = math.inf) -> Growth:
-    """Fit |difference| = A exp(rate t) over [start, stop], robustly.
+def fit_growth(t: FloatArray, size: FloatArray, stop: float = math.inf) -> Growth:
+    """Fit |difference| = A exp(rate t) up to ``stop``, robustly.
 
     A difference changes sign and jumps, so single points and least squares say little. The interval is divided
     into twelve windows with the median of log |difference| in each, and the rate is the median of the slopes between
@@ -44,7 +44,7 @@ def fit_growth(t: FloatArray, size: FloatArray, start: float = -math.inf, stop: 
     """
     windows, min_points = 12, 4
     size = np.abs(size)
-    usable = (t >= start) & (t <= stop) & np.isfinite(size) & (size > 1e-14)
+    usable = (t <= stop) & np.isfinite(size) & (size > 1e-14)
     times, logs = t[usable], np.log(size[usable])
     if len(times) < min_points:
         return Growth()

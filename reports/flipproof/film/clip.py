@@ -6,7 +6,7 @@ A track.csv has one row per frame, SI units and empty cells for missing values. 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -218,6 +218,6 @@ def smoothed_rate(t: FloatArray, theta: FloatArray) -> FloatArray:
     return mean
 
 
-def schema_comments(columns: Mapping[str, str] = SCHEMA) -> str:
+def schema_comments() -> str:
     """Return the schema as comment lines of a file."""
-    return "".join(f"# {name}: {text}\n" for name, text in columns.items() if text)
+    return "".join(f"# {name}: {text}\n" for name, text in SCHEMA.items() if text)

@@ -69,7 +69,7 @@ def batches(runs: list[tuple[Run, FloatArray]]) -> Iterator[list[tuple[Run, Floa
 
 def _kind(run: Run) -> tuple[Any, ...]:
     """Return solver and settings that load code of their own."""
-    return run.solver, run.settings.get("method"), run.settings.get("frame")
+    return run.solver, run.settings.get("method")
 
 
 def _begun(scenario: Scenario) -> Scenario:

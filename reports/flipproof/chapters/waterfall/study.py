@@ -145,12 +145,6 @@ class Waterfall:
         """The bar whose average over orders is largest in size."""
         return max(self.bars, key=lambda bar: abs(bar.average))
 
-    @property
-    def away(self) -> Bar | None:
-        """The bar that leads furthest away from free flight in the order of the ladder; None if none does."""
-        bars = [bar for bar in self.bars if bar.forward * self.total < 0.0]
-        return max(bars, key=lambda bar: abs(bar.forward), default=None)
-
 
 def program_run(throw: Scenario, steps: int) -> Run:
     """Return the published program's run."""
