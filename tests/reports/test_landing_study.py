@@ -70,7 +70,7 @@ SMALL = Size(
 
 
 def quiet(_size):
-    return lambda _points, _without: None
+    return lambda _points, _without, _made: None
 
 
 # ---------------------------------------------------------------------- aims

@@ -49,16 +49,16 @@ class Line:
     """One line on standard error, drawn anew twice a second, so that it moves while nothing is reported."""
 
     def __init__(self, title: str, *, hidden: bool) -> None:
-        self._title, self._share, self._words = title, 0.0, ""
+        self._title, self._share, self._words, self._found = title, 0.0, "", 0.0
         self._began = time.monotonic()
         self._ended = threading.Event()
         self._thread = None if hidden else threading.Thread(target=self._draw_on, daemon=True)
         if self._thread:
             self._thread.start()
 
-    def show(self, share: float, words: str) -> None:
-        """Take over the share that is done and what is done now."""
-        self._share, self._words = min(1.0, max(0.0, share)), words
+    def show(self, share: float, words: str, found: float = 0.0) -> None:
+        """Take over the share that is done, what is done now, and the share that was there before."""
+        self._share, self._words, self._found = min(1.0, max(0.0, share)), words, found
 
     def end(self) -> None:
         """Take the line away."""
@@ -74,7 +74,8 @@ class Line:
     def text(self, seconds: float) -> str:
         """Return the line after so many seconds."""
         full = int(WIDTH * self._share)
-        parts = (f"{seconds:.0f} s", time_left(self._share, seconds), self._words)
+        made = (self._share - self._found) / (1.0 - self._found) if self._found < 1.0 else 1.0
+        parts = (f"{seconds:.0f} s", time_left(made, seconds), self._words)
         return (
             f"{self._title} [{'#' * full}{'-' * (WIDTH - full)}] {self._share:4.0%}  {', '.join(filter(None, parts))}"
         )
@@ -87,12 +88,13 @@ class Line:
 
 @contextmanager
 def progress_bar(title: str, unit: str, *, quiet: bool = False) -> Iterator[Callable[..., None]]:
-    """Give what is to be called with the number made, the number planned and a name; a terminal shows a bar."""
+    """Give what is called with what is done, what is planned, a name and what was there before; a terminal shows it."""
     line = Line(title, hidden=quiet or not sys.stderr.isatty())
 
-    def progress(done: int, planned: int | None, label: str = "") -> None:
+    def progress(done: int, planned: int | None, label: str = "", found: int = 0) -> None:
         counted = f"{done} of {planned} {unit}s" if planned else f"{done} {unit}s"
-        line.show(done / planned if planned else 0.0, f"{counted}, {label}" if label else counted)
+        share, before = (done / planned, found / planned) if planned else (0.0, 0.0)
+        line.show(share, f"{counted}, {label}" if label else counted, before)
 
     try:
         yield progress

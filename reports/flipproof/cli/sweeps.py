@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, output, read_scenario, reader, sides
+from flipproof.cli.progress import progress_bar
 from flipproof.cli.signals import INTERRUPTED
 
 SLICES: Final = 50
@@ -94,26 +95,25 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
     """Run ``make(begin, where)`` under a bar of progress and print what it returns; an interrupt says what is kept."""
     from contextlib import ExitStack
 
-    from tqdm import tqdm
-
     stored = [0, 0]
 
     def say(words: str) -> None:
         print(f"flipproof: {words}", file=sys.stderr, flush=True)
 
-    def begin(size: int) -> Callable[[int, int], None]:
+    def begin(size: int) -> Callable[[int, int, bool], None]:
+        bars.close()
         stored[:] = 0, size
-        hide = options.quiet or None
-        bar = bars.enter_context(tqdm(total=size, unit="point", disable=hide, leave=False, smoothing=0.05))
-        without = 0
+        show = bars.enter_context(progress_bar(options.out.name, "point", quiet=options.quiet))
+        without = found = 0
 
-        def progress(points: int, unfinished: int) -> None:
-            nonlocal without
+        def progress(points: int, unfinished: int, made: bool) -> None:
+            nonlocal without, found
             stored[0] += points
             without += unfinished
-            if without:
-                bar.set_postfix_str(f"{without} without a whole flight", refresh=False)
-            bar.update(points)
+            found += 0 if made else points
+            show(stored[0], size, f"{without} without a whole flight" if without else "", found)
+            if stored[0] >= size:
+                bars.close()
 
         return progress
 
