@@ -3,10 +3,8 @@
 import copy
 import dataclasses
 import json
-import re
 from types import MappingProxyType
 
-import numpy as np
 import pytest
 from made_up import action as flipproof
 
@@ -16,10 +14,7 @@ from flipproof.chapters.horizon.chapter import Reach
 from flipproof.chapters.overlap.chapter import Amount
 from flipproof.chapters.stability.chapter import Layout
 from flipproof.check.diff import Change, change_of, compare_summaries, read_summary, scenario_changes, within
-from flipproof.check.diff_page import read_curves
-from flipproof.check.report_pair import differences, figure_report_pair
 from flipproof.frame import pool, solvers
-from flipproof.frame.columns import curves_csv
 from flipproof.frame.findings import Band, Finding
 from flipproof.frame.gather import evaluate, gather
 from flipproof.frame.provenance import provenance
@@ -202,92 +197,10 @@ def test_every_erratum_has_a_band(sound):
     assert all(0 <= finding["band"] <= 2e-6 * abs(finding["value"]) for finding in errata)
 
 
-# ---------------------------------------------------------------------- the page
-
-
-def page_of(tmp_path, *arguments):
-    """Return the page of a comparison that finds no difference."""
-    assert flipproof("diff", *arguments, "--html", tmp_path / "diff.html") == 0
-    return (tmp_path / "diff.html").read_text(encoding="utf-8")
-
-
-def with_curves(folder, factor=1.0, name="eq8", rows=5):
-    (folder / "figures").mkdir()
-    t = np.linspace(0, 0.4, rows)
-    curves = {f"omega/omega_0 {name} [1]": (t, factor * np.cos(t)), "omega/omega_0 pymunk [1]": (t[:3], t[:3])}
-    (folder / "figures" / "omega.csv").write_text(curves_csv(curves), encoding="utf-8")
-    return folder
-
-
-def test_the_page_shows_both_curves_and_needs_nothing_else(sound, tmp_path):
-    other = copy.deepcopy(sound)
-    other["findings"][0]["value"], other["findings"][0]["band"] = 7.0, 0.1
-    other["findings"][0]["title"] = "<script>alert(1)</script>\u202e\x9b\udcff"
-    old, new = (
-        with_curves(written(tmp_path / "old", sound)),
-        with_curves(written(tmp_path / "new", other), 1.01, rows=9),
-    )
-    assert flipproof("diff", old, new, "--html", tmp_path / "diff.html") == 1
-    page = (tmp_path / "diff.html").read_text(encoding="utf-8")
-    assert f"{len(sound['findings'])} findings compared: 1 differ" in page
-    assert sound["findings"][0]["id"] in page
-    assert "<script" not in page
-    assert "&lt;/script&gt;\\u202e\\x9b\\udcff" in page  # nothing hidden, nothing that no page can hold
-    assert not re.search(r'(?:src|href)="(?!data:)', page)
-    assert page.count('<img src="data:image/svg+xml,') == 1
-    assert "Left: angular velocity ω relative to its initial value ω₀ over the\ntime t since the release" in page
-    assert "<td>eq8</td><td>+0.01 of ω₀</td><td>0 s</td>" in page
-    assert "<td>pymunk</td><td>none</td>" in page
-
-
-def test_the_figure_names_its_axes_with_units():
-    t = np.linspace(0, 1, 5)
-    old, new = {"eq8": (t, t), "pymunk": (t, t)}, {"eq8": (t, 2 * t), "pymunk": (t, t)}
-    grid = np.reshape(figure_report_pair(old, new, differences(old, new)).axes, (2, 2))
-    assert [axes.get_title(loc="left") for axes in grid[:, 0]] == ["eq8", "pymunk"]
-    assert {axes.get_ylabel() for axes in grid[:, 0]} == {"ω / ω₀ [1]"}
-    assert {axes.get_ylabel() for axes in grid[:, 1]} == {"difference [1]"}
-    assert {axes.get_xlabel() for axes in grid[1]} == {"time t [s]"}
-    assert [line.get_label() for line in grid[0, 0].lines] == ["old", "new"]
-    np.testing.assert_array_equal(grid[0, 1].lines[0].get_ydata(), t)
-
-
-def test_the_page_says_which_curves_are_missing(sound, tmp_path):
-    old, new = written(tmp_path / "old", sound), with_curves(written(tmp_path / "new", sound))
-    page = page_of(tmp_path, old / "summary.json", new)
-    assert f"The old report&#39;s curves are not shown: {old / 'figures/omega.csv'} cannot be read" in page
-    assert "The new report" not in page
-    with_curves(old, name="free-flight")
-    assert "In one of the reports alone: eq8, free-flight." in page_of(tmp_path, old, new)
-    (old / "figures" / "omega.csv").write_text("t [s],omega/omega_0 eq8 [1]\n0,fast\n")
-    assert "could not convert string to float" in page_of(tmp_path, old, new)
-
-
-def test_curves_are_read_as_they_were_written(tmp_path):
-    curves = {
-        "omega/omega_0 a [1]": (np.arange(4.0), np.arange(4.0) / 7),
-        "omega/omega_0 b [1]": (np.arange(3.0) / 3, np.ones(3)),
-    }
-    (tmp_path / "omega.csv").write_text(curves_csv(curves), encoding="utf-8")
-    found = read_curves(tmp_path / "omega.csv")
-    assert list(found) == ["a", "b"]
-    for name, (t, values) in curves.items():
-        np.testing.assert_allclose(found[name[14]][0], t, rtol=1e-8)
-        np.testing.assert_allclose(found[name[14]][1], values, rtol=1e-8)
-
-
-def test_curves_are_taken_apart_where_both_are():
-    t, late = np.linspace(0, 1, 5), np.linspace(0, 0.6, 4)
-    apart = differences({"a": (t, 2 * t), "b": (t, t)}, {"a": (late, 3 * late)})
-    assert list(apart) == ["a"]
-    np.testing.assert_allclose(apart["a"][0], [0, 0.25, 0.5])
-    np.testing.assert_allclose(apart["a"][1], [0, 0.25, 0.5])
-
-
-def test_a_page_that_cannot_be_written_is_refused_first(sound, tmp_path):
+def test_a_file_that_cannot_be_written_is_refused_first(sound, tmp_path):
     old = written(tmp_path / "old", sound)
-    with pytest.raises(ValueError, match=r"--html .* is a folder; name a file"):
-        flipproof("diff", old, old, "--html", tmp_path)
+    with pytest.raises(ValueError, match=r"--json .* is a folder; name a file"):
+        flipproof("diff", old, old, "--json", tmp_path)
 
 
 @pytest.mark.parametrize(

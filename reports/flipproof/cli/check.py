@@ -40,10 +40,6 @@ def add_checks(commands: Any) -> None:
     diff.add_argument("old", type=Path, metavar="OLD", help="a report's folder, or its summary.json")
     diff.add_argument("new", type=Path, metavar="NEW", help="the same; changes are from OLD to NEW")
     diff.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
-    diff.add_argument(
-        "--html", type=output, metavar="FILE", help="write the comparison as one page, too, with the curves of both"
-    )
-
     add_json(diff, "the comparison")
 
     check = add_command(commands, "check", "Check a throw in a few seconds, one line per claim.", command_check)
@@ -65,16 +61,11 @@ def add_checks(commands: Any) -> None:
 
 def command_diff(options: argparse.Namespace) -> int:
     """Print what differs; return 1 if anything does."""
-    check_outputs(options, "html", "json")
+    check_outputs(options, "json")
     from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
 
     old, new = read_summary(options.old), read_summary(options.new)
     comparison = compare_summaries(old, new, TOLERANCE if options.tolerance is None else options.tolerance)
-    if options.html:
-        from flipproof.check.diff_page import diff_page
-        from flipproof.output.folder import write_text
-
-        write_text(options.html, diff_page(options.old, options.new, old, new, comparison))
     write_json(options.json, comparison.to_mapping())
     print(inert(comparison.text))
     return 0 if comparison.same else 1
