@@ -9,12 +9,11 @@ from typing import Any, Final, NamedTuple
 
 from flipproof.chapters.work_precision.contenders import FULL, THROW, common_times, plan_work_precision
 from flipproof.chapters.work_precision.figure import figure_work_precision
-from flipproof.chapters.work_precision.study import Cost, Curve, Price, WorkPrecision, study_work_precision
+from flipproof.chapters.work_precision.study import Curve, WorkPrecision, study_work_precision
 from flipproof.frame.chapter import Ask, Band, Call, Chapter, Exhibit, Finding, Study, observed
 from flipproof.frame.columns import rows_csv
 from flipproof.frame.findings import finite_or_none
 from flipproof.frame.timing import batches, make_timed
-from slicemodel.scenario import shortened
 
 NAME: Final = "impacts"
 TITLE: Final = "the paper's throw, with all its impacts"
@@ -32,7 +31,7 @@ def study(ask: Ask) -> Study[WorkPrecision]:
 
 
 def claims(study: WorkPrecision) -> Iterator[Finding]:
-    """Yield the order in cost of midpoint, prices side by side, the floors and what failed."""
+    """Yield the order in cost of midpoint; what others reach stands in figure and table."""
     slope = study.curves["midpoint on eq8"].slope
     words = "order 2 where nothing strikes; v_CM jumps at an impact, and drag feels a mean of it for one whole step"
     yield observed(
@@ -42,80 +41,6 @@ def claims(study: WorkPrecision) -> Iterator[Finding]:
         note=slope.reason or words,
         band=Band(slope.error, "fit"),
     )
-    yield _pair(study, "exact-step on eq8", "midpoint on eq8")
-    yield _pair(study, "pymunk on free-flight", "mujoco on free-flight")
-    yield _cheapest(study, 1e-3)
-    yield _cheapest(study, 1e-6)
-    yield _floors(study)
-    yield from _failures(study)
-
-
-def _pair(study: WorkPrecision, first_key: str, second_key: str) -> Finding:
-    """Compare two contenders of one equation at the smallest error that both keep."""
-    first, second = study.curves[first_key], study.curves[second_key]
-    name, rival = first.contender.name, second.contender.name
-    id_ = f"work-{name}-{rival}".replace(" ", "-")
-    title = f"steps of {name} for one of {rival}, at equal error against {first.contender.equation}"
-    for error in (10.0 ** (-k / 2) for k in range(22, 1, -1)):
-        steps_a, steps_b = first.price(error, "steps"), second.price(error, "steps")
-        if steps_a is not None and steps_b is not None:
-            break
-    else:
-        return observed(id=id_, title=title, value=None, note="no error that both keep")
-    if steps_a.bound and steps_b.bound:
-        return observed(id=id_, title=title, value=None, note=f"the first levels of both keep {error:.1e} of ω₀")
-
-    def against(cost: Cost, unit: str, scale: float = 1.0) -> str:
-        prices = (curve.price(error, cost) for curve in (first, second))
-        return " against ".join("–" if price is None else f"{scale * price.value:.2g}" for price in prices) + f" {unit}"
-
-    limit = {(False, True): "at least, ", (True, False): "at most, "}.get((steps_a.bound, steps_b.bound), "")
-    count_a, count_b = (f"{'at most ' if steps.bound else ''}{steps.value:.0f}" for steps in (steps_a, steps_b))
-    note = f"error {error:.1e} of ω₀: {count_a} steps of {name}, {count_b} of {rival}; "
-    note += f"{against('work', 'updates of one slice')}, {against('seconds', 'ms of processor time', 1e3)}"
-    return observed(id_, limit + title, steps_a.value / steps_b.value, note=note)
-
-
-def _cheapest(study: WorkPrecision, error: float) -> Finding:
-    """Name the cheapest that solves Eq. 8 to an error, by updates and by time."""
-    curves = study.of("eq8")
-
-    def ranked(cost: Cost) -> list[tuple[Price, str]]:
-        prices = ((curve.price(error, cost), curve.contender.name) for curve in curves)
-        return sorted((price, name) for price, name in prices if price is not None)
-
-    def words(cost: Cost, unit: str) -> str:
-        return ", ".join(f"{name} {price.text}{unit}" for price, name in ranked(cost))
-
-    work = ranked("work")
-    keepers = {name for _, name in work}
-    too_coarse = [curve.contender.name for curve in curves if curve.contender.name not in keepers]
-    title = f"eq8 to {error:.0e} of ω₀: updates of the second cheapest over the cheapest"
-    note = f"updates: {words('work', '')}; processor time: {words('seconds', ' s')}"
-    note += f"; not reached by {', '.join(too_coarse)}" if too_coarse else ""
-    ratio = work[1][0].value / work[0][0].value if len(work) > 1 else None
-    return observed(f"work-cheapest-eq8-{error:.0e}", title, ratio, note=note)
-
-
-def _floors(study: WorkPrecision) -> Finding:
-    floors = {name: reference.floor for name, reference in study.references.items() if math.isfinite(reference.floor)}
-    highest = max(floors, key=lambda name: floors[name])
-    at = [curve.contender.name for curve in study.of(highest) if any(point.at_floor for point in curve.points)]
-    other_floors = ", ".join(f"{name} {floor:.0e}" for name, floor in floors.items() if name != highest)
-    note = f"{highest}; at the floor: {', '.join(at) or 'none'}; others: {other_floors}"
-    title = "highest floor of a reference, below which no contender is ranked"
-    return observed("work-floor", title, floors[highest], "of ω₀", note)
-
-
-def _failures(study: WorkPrecision) -> Iterator[Finding]:
-    failed = {key: curve.failed for key, curve in study.curves.items() if curve.failed}
-    if failed:
-        title = f"levels that failed, of {sum(len(curve.points) for curve in study.curves.values())}"
-        note = "; ".join(
-            f"{key}: {len(points)} of {len(study.curves[key].points)}, {shortened(points[0].reason, 90)}"
-            for key, points in failed.items()
-        )
-        yield observed("work-failed", title, float(sum(map(len, failed.values()))), note=note)
 
 
 def figures(study: WorkPrecision) -> Iterator[Exhibit]:

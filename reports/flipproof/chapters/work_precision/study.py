@@ -34,8 +34,8 @@ from slicemodel import Scenario, Trajectory
 from slicemodel.schemes import SCHEMES
 from slicemodel.trajectory import FloatArray
 
-Cost = Literal["work", "seconds", "steps"]
-"""Updates of one slice, seconds of the processor, the solver's own steps."""
+Cost = Literal["work", "seconds"]
+"""Updates of one slice, seconds of the processor."""
 
 SATURATED: Final = 0.2
 """Errors above this fraction of omega_0 say that the run is wrong, not how wrong: no slope is read off them."""
