@@ -1,8 +1,8 @@
 """Who competes in the work-precision study, with which settings, against which equation.
 
-Every scheme of the slice model, every method of the reference and every engine comes from its package's own registry:
-a new one appears by itself. Each is held against the equation *it* solves, never against the one we believe in: what
-lies between equations is model form, and stands elsewhere.
+Every scheme of the slice model that converges to a model, every method of the reference and every engine comes from
+its package's own registry: a new one appears by itself. Each is held against the equation *it* solves, never against
+the one we believe in: what lies between equations is model form, and stands elsewhere.
 
 ==========  ============================================  ==========================================================
 family      refined by                                    work, in updates of one slice
@@ -20,7 +20,7 @@ engine has several members: their impacts fall at other phases of the step, and 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Final, Literal, NamedTuple
 
@@ -37,14 +37,6 @@ from slicemodel.trajectory import FloatArray
 
 COMMON: Final = 40
 """Intervals that all runs of a throw share."""
-
-AT_REST: Final = "at rest"
-"""The limit of ``paper-typeset``: nothing moves, and omega is omega_0 for ever."""
-
-OWN_LIMIT: Final = "limit of "
-"""Leads the name of an equation that no model states: where the scheme itself goes on finer grids."""
-
-EQUATION_OF_SCHEME: Final[Mapping[str, str]] = {**LIMITS, "paper-typeset": AT_REST}
 
 IMPLICIT_ON: Final = ("eq8", "free-flight")
 """The equations that implicit methods are asked for: one without recoil and one with it."""
@@ -94,7 +86,7 @@ class Contender:
     ----------
     name : str - as figures and tables print it
     family : {"scheme", "method", "engine"}
-    equation : str - what it is held against: a model's name, AT_REST, or OWN_LIMIT and the scheme
+    equation : str - the model that it is held against
     levels : the runs of every level, the coarsest first
     """
 
@@ -127,10 +119,7 @@ def plan_work_precision(throw: Scenario, effort: Effort) -> Plan:
     rivals = (*_schemes(throw, effort), *_engines(throw, effort))
     solved = {rival.equation for rival in rivals}
     rivals += tuple(_methods(throw, effort, [model for model in MODELS if model in solved]))
-    first = {rival.equation: rival for rival in reversed(rivals)}
-    references = {
-        equation: _reference(throw, first[equation]) for equation in dict.fromkeys(r.equation for r in rivals)
-    }
+    references = {model: _reference(throw, model) for model in dict.fromkeys(rival.equation for rival in rivals)}
     return Plan(throw, rivals, references)
 
 
@@ -143,9 +132,8 @@ def _levels(throw: Scenario, solver: str, key: str, levels: Iterable[list[dict[s
 
 
 def _schemes(throw: Scenario, effort: Effort) -> Iterator[Contender]:
-    for name, scheme in SCHEMES.items():
-        equation = EQUATION_OF_SCHEME.get(name, OWN_LIMIT + name)
-        fixed = {"store": "summary", "rebound": "in-step" if scheme.form.in_step else "grid"}
+    for name, equation in LIMITS.items():
+        fixed = {"store": "summary", "rebound": "in-step" if SCHEMES[name].form.in_step else "grid"}
         # Points of the grid: one more than steps.
         levels = [[{**fixed, "steps": steps + 1} for steps in level] for level in effort.schemes.steps()]
         runs = _levels(throw, name, f"{name} on {equation}", levels)
@@ -184,24 +172,15 @@ def _methods(throw: Scenario, effort: Effort, solved: list[str]) -> Iterator[Con
             yield Contender(name=method, family="method", equation=model, levels=runs)
 
 
-def _reference(throw: Scenario, rival: Contender) -> tuple[Run, ...]:
-    """Return the reference of a contender's equation and its witnesses."""
-    variants: list[dict[str, Any]]
-    if rival.equation in (*MODELS, AT_REST):
-        solver, throw = ("eq8", replace(throw, frozen=True)) if rival.equation == AT_REST else (rival.equation, throw)
-        usual, times = usual_rest_speed(solver), common_times(throw)
-        variants = [{"method": "taylor", "rest_speed": usual / 10, "times": times}]
-        for method, rtol, radians in (("LSODA", 1e-10, 0.02), ("DOP853", 1e-11, 0.04)):
-            longest = min(radians / abs(throw.omega0), throw.duration)
-            tolerances = {"rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": usual, "max_step": longest}
-            variants.append({"method": method, **tolerances, "times": times})
-    else:
-        # The scheme's own limit: the scheme on a grid eight times finer than its last level, and on half of that.
-        solver, settings = rival.levels[-1][0].solver, rival.levels[-1][0].settings
-        finest = 8 * (settings["steps"] - 1)
-        variants = [{**settings, "steps": finest // coarser + 1} for coarser in (1, 2)]
+def _reference(throw: Scenario, model: str) -> tuple[Run, ...]:
+    """Return the reference of an equation and its witnesses."""
+    usual, times = usual_rest_speed(model), common_times(throw)
+    variants: list[dict[str, Any]] = [{"method": "taylor", "rest_speed": usual / 10, "times": times}]
+    for method, rtol, radians in (("LSODA", 1e-10, 0.02), ("DOP853", 1e-11, 0.04)):
+        longest = min(radians / abs(throw.omega0), throw.duration)
+        tolerances = {"rtol": rtol, "atol": 1e-3 * rtol, "rest_speed": usual, "max_step": longest}
+        variants.append({"method": method, **tolerances, "times": times})
     names = ("reference", "witness 1", "witness 2")
     return tuple(
-        Run(solver, throw, settings, f"work, {name}, {rival.equation}")
-        for name, settings in zip(names, variants, strict=False)
+        Run(model, throw, settings, f"work, {name}, {model}") for name, settings in zip(names, variants, strict=True)
     )

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from flipproof.chapters.work_precision.study import Curve, WorkPrecision
 from flipproof.figures.style import EXTRA_COLOURS, STYLES, new_panels, styled
-from ode_reference.models import MODELS
 
 COLOURS: Final = {"DOP853": "#000000", "LSODA": "#0050A0", "Radau": "#6A5ACD"}
 """Of those whom ``STYLES`` does not know."""
@@ -39,11 +38,10 @@ def figure_work_precision(study: WorkPrecision) -> Figure:
 def _panel(axes: Axes, study: WorkPrecision, equation: str, bottom: float) -> None:
     floor = study.references[equation].floor
     axes.set(xscale="log", yscale="log", ylim=(bottom, HIGHEST))
-    words = f"equation {equation}" if equation in MODELS else equation
     if math.isfinite(floor):
         axes.axhspan(bottom, floor, color="#c8c8c8", linewidth=0, zorder=0)
-    words += f", floor {floor:.0e}" if math.isfinite(floor) else ", no reference"
-    axes.set_title(words, fontsize=9.5, loc="left")
+    words = f"floor {floor:.0e}" if math.isfinite(floor) else "no reference"
+    axes.set_title(f"equation {equation}, {words}", fontsize=9.5, loc="left")
     counts = dict.fromkeys(LINES, 0)
     for curve in study.of(equation):
         _curve(axes, curve, counts[curve.contender.family])
