@@ -15,25 +15,16 @@ from flipproof.frame.pool import SerialExecutor
 from flipproof.output.folder import OutputError
 from flipproof.paper import figures as paper_figures
 from flipproof.paper.cases import HALF_FULL, family
-from flipproof.paper.figures import ORDER, TIMED, check_figures, exhibits_paper, keys_of
+from flipproof.paper.figures import ORDER, check_figures, exhibits_paper, keys_of
 from flipproof.paper.figures_bottle import Pose, cap_of_tipping
 from flipproof.paper.figures_panels import Axis, Grid, Line, Row, figure_grid, ranked, table_grid
-from flipproof.paper.runs import PUBLISHED, SOLVERS, Cost
+from flipproof.paper.runs import PUBLISHED, SOLVERS
 from slicemodel.observables import plateau_of_points, static_toppling_angle, toppling_angle
-
-COSTS = tuple(
-    Cost(solver=solver, slices=slices, steps=steps, work=slices * steps, seconds=1e-6 * slices * steps)
-    for solver in SOLVERS
-    for slices in (10, 100)
-    for steps in (10, 1000)
-)
 
 
 @pytest.fixture(scope="module")
 def runs():
-    return replace(
-        paper_figures.gather_figures([name for name in ORDER if name not in TIMED], SerialExecutor()), costs=COSTS
-    )
+    return paper_figures.gather_figures(ORDER, SerialExecutor())
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +39,7 @@ def table(exhibit):
 
 
 def test_every_figure_is_there(exhibits):
-    assert " ".join(ORDER) == "2b 3b 5a 5b 5c 5d 6a 6b 6c 7a 7b 8a 8b 8c 9a 9b 9c S1a S1b S1c"
+    assert " ".join(ORDER) == "2b 3b 5a 5b 5c 5d 6a 6b 6c 7a 7b 8a 8b 8c 9a 9b 9c S1a"
     assert [name.removeprefix("paper-").partition("-")[0] for name in exhibits] == [
         name for name in ORDER for _ in range(2 if name == "5a" else 1)
     ]
@@ -59,14 +50,14 @@ def test_every_figure_has_words_numbers_and_three_solvers(exhibits):
         assert re.search(r"\d\.\d|\d", exhibit.alt), name
         assert "nan" not in exhibit.alt.lower() + exhibit.caption.lower(), name
         for word in ("published program", "Eq. 8", "free flight"):
-            assert word in exhibit.alt or name in ("paper-S1a", "paper-S1b", "paper-S1c"), (name, word)
+            assert word in exhibit.alt or name == "paper-S1a", (name, word)
         header = exhibit.table.splitlines()[0]
         for solver in SOLVERS:
             assert solver in exhibit.table, (name, solver)
         assert re.search(r"\[(s|1|m|rad|rad/s|degrees|m/s)\]", header), name
 
 
-@pytest.mark.parametrize("name", ["paper-2b", "paper-3b", "paper-5c", "paper-7b", "paper-9a", "paper-S1b"])
+@pytest.mark.parametrize("name", ["paper-2b", "paper-3b", "paper-5c", "paper-7b", "paper-9a"])
 def test_figures_are_drawn(exhibits, name):
     drawing = exhibits[name].drawing
     assert drawing.svg.startswith("<?xml")
@@ -150,11 +141,6 @@ def test_a_missing_flight_leaves_a_gap_and_its_reason(runs):
     assert "omega/omega_0, free-flight, M̃ = 0.25 [1]" not in columns
 
 
-def test_figures_of_cost_need_costs(runs):
-    names = {exhibit.name for exhibit in exhibits_paper(replace(runs, costs=()))}
-    assert not names & {"paper-S1b", "paper-S1c"}
-
-
 # ------------------------------------------------------- panels
 
 
@@ -185,7 +171,7 @@ def test_names_are_sorted_and_lenient_about_case():
 
 @pytest.mark.parametrize("name", ["4", "10a", "", "fig7b", "7"])
 def test_an_unknown_figure_is_answered_in_one_line_with_the_list(name, tmp_path):
-    with pytest.raises(ValueError, match=r"unknown; known: 2b, 3b, 5a, .*, S1c") as caught:
+    with pytest.raises(ValueError, match=r"unknown; known: 2b, 3b, 5a, .*, S1a") as caught:
         action("paper", "--figure", name, "--out", tmp_path / "out")
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "out").exists()

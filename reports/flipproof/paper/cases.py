@@ -142,9 +142,6 @@ _ROWS: Final[tuple[tuple[Any, ...], ...]] = (
      "Three fillings show what the number of time steps does."),
     ("figure-S1-steps", "P", (10.0, 100.0, 1000.0), "1", "caption of Supp. Fig. 1",
      "10, 100 and 1000 time steps are compared."),
-    ("figure-S1-slices", "N", (10.0, 30.0, 100.0, 300.0, 1000.0), "1", CHOSEN,
-     "Computing time is plotted over the number of slices and over that of time steps.",
-     "Only N = P = 1000 is named, with about 40 s at most."),
 )  # fmt: skip
 
 PARAMETERS: Final[Mapping[str, Parameter]] = MappingProxyType({row[0]: Parameter(*row) for row in _ROWS})

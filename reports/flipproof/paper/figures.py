@@ -19,16 +19,14 @@ from flipproof.output.folder import check_replaceable, replaced_folder
 from flipproof.output.templating import environment
 from flipproof.paper import figures_bottle, figures_curves, figures_levels
 from flipproof.paper.cases import HEADER, family, paper_throw, parameter_rows
-from flipproof.paper.runs import PaperRuns, cost_calls, group_calls, plan_figures
+from flipproof.paper.runs import PaperRuns, group_calls, plan_figures
 
 RECIPES: Final = dict(sorted((figures_bottle.RECIPES | figures_curves.RECIPES | figures_levels.RECIPES).items()))
 """Figure -> the families of throws that it shows, and what makes its exhibits."""
 
 ORDER: Final = tuple(RECIPES)
-"""The figures in the paper's order. Figures 1, 2a, 3a and 4 are photographs, notation and measurements."""
-
-TIMED: Final = ("S1b", "S1c")
-"""Figures that need the measured costs."""
+"""The figures in the paper's order. Figures 1, 2a, 3a and 4 are photographs, notation and measurements; S1b and S1c
+plot computing time, which ``cost`` counts without a clock."""
 
 
 def check_figures(names: Iterable[str]) -> tuple[str, ...]:
@@ -49,10 +47,9 @@ def keys_of(names: Iterable[str]) -> set[str]:
 
 
 def exhibits_paper(runs: PaperRuns, names: Iterable[str] = ORDER) -> Iterator[Exhibit]:
-    """Yield the exhibits of the figures, in the paper's order; those of cost only where costs were measured."""
+    """Yield the exhibits of the figures, in the paper's order."""
     for name in check_figures(names):
-        if runs.costs or name not in TIMED:
-            yield from RECIPES[name][1](runs)
+        yield from RECIPES[name][1](runs)
 
 
 def make_gallery(
@@ -102,10 +99,8 @@ def gather_figures(
 
     def study(_: Ask) -> Study[PaperRuns]:
         figures = group_calls(plan_figures(keys_of(wanted)), "the paper's figures")
-        costs = cost_calls() if set(wanted) & set(TIMED) else []
         flights = yield figures
-        flights = (yield costs) if costs else flights  # alone, so that no other run takes their time
-        return PaperRuns.of(flights, figures, costs=costs)
+        return PaperRuns.of(flights, figures)
 
     chapter = Chapter(name="figures", title="The paper's figures", study=study)
     part = Part(chapter.name, chapter.title, "", (chapter,))

@@ -1,11 +1,10 @@
-"""Figures 7b, 9b, 9c, S1b and S1c: one number per flight over filling, slices or time steps."""
+"""Figures 7b, 9b and 9c: one number per flight over the filling."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -16,7 +15,7 @@ from flipproof.paper import figures_panels as panels
 from flipproof.paper.cases import paper_throw
 from flipproof.paper.figures_panels import Axis, Grid, Line
 from flipproof.paper.observe import level_by_points, steady_level
-from flipproof.paper.runs import PUBLISHED, SOLVERS, PaperRuns
+from flipproof.paper.runs import SOLVERS, PaperRuns
 from slicemodel import Trajectory
 from slicemodel.landing import Moment, moment_at, next_upright
 from slicemodel.observables import static_toppling_angle
@@ -124,49 +123,8 @@ def _at_two_moments(runs: PaperRuns, of: Callable[[Moment], float]) -> tuple[Poi
     )
 
 
-# ---------------------------------------------------------------------- computing time
-
-
-def _exhibits_cost(over: str, runs: PaperRuns) -> Iterator[Exhibit]:
-    """Yield what a run costs over its number of "slices" or "steps", a curve for each value of the other one."""
-    name, words, x, kept, symbol = {
-        "slices": ("S1b", "slices N", Axis("slices N [1]", "N [1]", log=True), "steps", "P"),
-        "steps": ("S1c", "time steps P", Axis("time steps or output times P [1]", "P [1]", log=True), "slices", "N"),
-    }[over]
-    costs = runs.costs
-    every = sorted({getattr(cost, kept) for cost in costs})
-
-    def lines(solver: str, of: str) -> Iterator[Line]:
-        for rank, value in enumerate(every):
-            chosen = [cost for cost in costs if cost.solver == solver and getattr(cost, kept) == value]
-            if len(chosen) > 1:
-                x, y = np.array(sorted((getattr(cost, over), getattr(cost, of)) for cost in chosen), dtype=np.float64).T
-                look = {**panels.ranked(rank, len(every)), "marker": "o", "markersize": 4.0}
-                yield Line(f"{symbol} = {value}", x, y, look)
-
-    work = Axis("work [slice evaluations]", "work [1]", log=True)
-    seconds = Axis("processor time [s]", "processor time [s]", log=True)
-    rows = (panels.row_of(work, partial(lines, of="work")), panels.row_of(seconds, partial(lines, of="seconds")))
-    published = [cost for cost in costs if cost.solver == PUBLISHED]
-    ends = sorted((getattr(cost, over), cost.work) for cost in published if getattr(cost, kept) == every[-1])
-    (n_first, work_first), (n_last, work_last) = ends[0], ends[-1]
-    exponent = math.log(work_last / work_first) / math.log(n_last / n_first)
-    yield panels.exhibit_grid(
-        name, f"what a run costs over its number of {words}",
-        "Counted work above, processor time of this machine below. The published program's work is N P by "
-        "construction, straight and of slope 1; its time is this program's compiled loop and bends where the fixed "
-        "cost of a run dominates. The others evaluate their right-hand side as often as the impacts ask; their output "
-        "times cost nothing.",
-        f"Log-log plots of work and processor time by three solvers. The published program's work grows as the power "
-        f"{exponent:.2f}; the longest of its runs took {max(cost.seconds for cost in published):.2g} s.",
-        Grid(x, rows),
-    )  # fmt: skip
-
-
 RECIPES: Final[dict[str, panels.Recipe]] = {
     "7b": (("filling",), _exhibits_7b),
     "9b": (("filling", "long"), _exhibits_9b),
     "9c": (("filling", "long"), _exhibits_9c),
-    "S1b": ((), partial(_exhibits_cost, "slices")),
-    "S1c": ((), partial(_exhibits_cost, "steps")),
 }

@@ -59,7 +59,6 @@ class Axis:
     low: float | None = None
     high: float | None = None
     upside_down: bool = False
-    log: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,10 +144,6 @@ def head(axes: Axes, solver: str) -> None:
 
 def _set_range(axes: Axes, x: Axis, row: Row) -> None:
     y = row.y
-    if x.log:
-        axes.set_xscale("log")
-    if y.log:
-        axes.set_yscale("log")
     # Without a limit of its own an axis goes on following the curves of all panels that share it.
     if x.low is not None and x.high is not None:
         axes.set_xlim(x.low, x.high)

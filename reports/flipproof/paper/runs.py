@@ -1,19 +1,16 @@
-"""The runs behind the paper's figures and statements, looked up by name, and what they cost on this machine."""
+"""The runs behind the paper's figures and statements, looked up by name."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import product
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
 import numpy as np
 
 from flipproof.frame.flights import Call, Flights
-from flipproof.frame.solvers import Run, RunResult, make, solve
+from flipproof.frame.solvers import Run, RunResult, make
 from flipproof.paper import observe
 from flipproof.paper.cases import ICE, Case, all_cases, family, numbers, paper_steps, paper_throw
 from ode_reference.models import LADDER
@@ -68,19 +65,16 @@ class Planned:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperRuns:
-    """Every planned run of the paper's figures and statements by its name, and costs if they were asked for."""
+    """Every planned run of the paper's figures and statements by its name."""
 
     results: Mapping[Name, RunResult]
-    costs: tuple[Cost, ...] = ()
 
     @classmethod
-    def of(
-        cls, answers: Flights, calls: Iterable[Call], planned: Iterable[Planned] = (), costs: Iterable[Call] = ()
-    ) -> PaperRuns:
-        """Return what became of ``group_calls``, of runs that are not grouped, and of ``cost_calls``."""
+    def of(cls, answers: Flights, calls: Iterable[Call], planned: Iterable[Planned] = ()) -> PaperRuns:
+        """Return what became of ``group_calls`` and of runs that are not grouped."""
         results = {plan.name: answers[plan.run] for plan in planned if not plan.grouped}
         results |= {name: result for call in calls for name, result in answers.answer(call).items()}
-        return cls(results=results, costs=tuple(cost for call in costs for cost in answers.answer(call)))
+        return cls(results=results)
 
     def flights(self, solver: str) -> observe.CaseFlights:
         """Return the flights of one equation, with those at half the slices and half the steps where there are any."""
@@ -149,13 +143,6 @@ def group_calls(planned: Iterable[Planned], words: str) -> list[Call]:
     # All at once would take a worker gigabytes.
     groups = (grouped[k : k + 12] for k in range(0, len(grouped), 12))
     return [Call(make_group, (group,), f"{words}, {group[-1].name[1]}") for group in groups]
-
-
-def cost_calls() -> list[Call]:
-    """Return the calls that measure what runs cost."""
-    published = Call(measure_published, (PUBLISHED,), "the cost of the published program", timed=True)
-    event_driven = (Call(measure_event_driven, (name,), f"the cost of {name}", timed=True) for name in SOLVERS[1:])
-    return [published, *event_driven]
 
 
 def make_group(group: Iterable[Planned]) -> dict[Name, RunResult]:
@@ -258,56 +245,3 @@ def plan_published(half: Half) -> Iterator[Planned]:
         store = "full" if key in whole else "summary"
         planned = _planned(PUBLISHED, key, scenario, half, steps=steps, store=store)
         yield replace(planned, thin=thin, grouped=True)
-
-
-# ---------------------------------------------------------------------- what runs cost on this machine at this moment
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """One run of N slices, timed: ``seconds`` of processor time, compiled.
-
-    ``steps`` are P, the steps of the published program or the output times of an event-driven solver; ``work`` counts
-    slice steps N P of the published program, slices times Taylor series otherwise.
-    """
-
-    solver: str
-    slices: int
-    steps: int
-    work: int
-    seconds: float
-
-
-def _numbers(of: str) -> list[int]:
-    return [round(value) for value in numbers(f"figure-S1-{of}")]
-
-
-def measure_published(solver: str) -> tuple[Cost, ...]:
-    """Time the published program over the slices and steps of Supp. Fig. 1; the least of five runs."""
-    throw = paper_throw()
-    _seconds(solver, throw, steps=2, store="summary")  # compiles
-    costs = []
-    for slices, steps in product(_numbers("slices"), _numbers("steps")):
-        run = partial(_seconds, solver, throw.with_slices(slices), steps=steps, store="summary")
-        costs.append(Cost(solver, slices, steps, slices * steps, min(run()[0] for _ in range(5))))
-    return tuple(costs)
-
-
-def measure_event_driven(solver: str) -> tuple[Cost, ...]:
-    """Time an event-driven solver over slices, and over the number of output times that stands for P there."""
-    throw = paper_throw()
-    _seconds(solver, throw.with_slices(1), times=[throw.duration / 100])  # loads the compiled flow
-    costs = []
-    for slices, steps in product((10, 100, 500), _numbers("steps")):
-        # Output times do not change the steps of these solvers: one number of slices shows that.
-        if steps >= paper_steps() or slices == 100:
-            times = np.linspace(0.0, throw.duration, steps)
-            seconds, run = _seconds(solver, throw.with_slices(slices), times=times)
-            costs.append(Cost(solver, slices, steps, slices * int(run.diagnostics["evaluations"]), seconds))
-    return tuple(costs)
-
-
-def _seconds(solver: str, scenario: Scenario, **settings: Any) -> tuple[float, Trajectory]:
-    began = time.process_time()
-    run = solve(solver, scenario, **settings)
-    return time.process_time() - began, run
