@@ -50,18 +50,23 @@ def on_the_grid(height, speed, restitution, gravity, dt, duration):
     return dt * np.arange(len(rows)), *map(np.array, zip(*rows, strict=True))
 
 
+def remarks_of(made):
+    """Return name -> remark of the properties in which an engine parts from the exact answers."""
+    return {measured.name: measured.remark for measured in made.measurements if measured.remark}
+
+
 @pytest.mark.parametrize("dt", [4e-3, 2e-3, 1e-3, 5e-4])
 @pytest.mark.parametrize("good", [located, single])
 def test_a_good_bouncer_gets_no_remark(good, dt):
-    assert passport(Adapter("good", good), dt).remarks == {}
+    assert remarks_of(passport(Adapter("good", good), dt)) == {}
 
 
 def test_a_bouncer_on_the_grid_is_of_first_order_and_says_so():
     made = passport(Adapter("grid", on_the_grid))
     assert 0.6 < made["order"].numbers["order"] < 1.6
     assert "on the grid" in made["time of hit"].sentence
-    assert "restitution" not in made.remarks
-    assert "order" not in made.remarks
+    assert "restitution" not in remarks_of(made)
+    assert "order" not in remarks_of(made)
 
 
 def changed(**names):
@@ -187,7 +192,7 @@ def test_a_body_that_still_goes_down_has_no_restitution_yet():
         slow = speed > -0.03 and gravity == 0
         return (t, height + speed * t, np.full(len(t), speed)) if slow else (t, y, v)
 
-    remarks = passport(Adapter("creeping", creeping)).remarks
+    remarks = remarks_of(passport(Adapter("creeping", creeping)))
     words = "a body of 0.02 m/s with e = 0 still goes down 0.15 s after its hit; nothing rebounds below 0.0299 m/s"
     assert remarks == {"restitution": words}
 
@@ -264,11 +269,11 @@ def test_engines_of_the_project_have_a_passport(engine):
     made = passport(load(engine))
     assert made["contract"].numbers["deterministic"]
     if engine == "pymunk":
-        assert made.remarks == {}
+        assert remarks_of(made) == {}
         assert made["restitution"].numbers["largest_difference"] < 1e-3
         assert 0.7 < made["order"].numbers["order"] < 1.3
     else:
-        assert {"restitution", "energy", "penetration"} <= set(made.remarks)
+        assert {"restitution", "energy", "penetration"} <= set(remarks_of(made))
         assert 0.005 < made["restitution"].numbers["largest_difference"] < 0.3
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -58,11 +58,6 @@ class Passport:
     def __getitem__(self, name: str) -> Measurement:
         return next(m for m in self.measurements if m.name == name)
 
-    @property
-    def remarks(self) -> dict[str, str]:
-        """Name -> remark of the properties in which the engine parts from the exact answers."""
-        return {m.name: m.remark for m in self.measurements if m.remark}
-
     def to_mapping(self) -> dict[str, Any]:
         """Return the passport as JSON takes it."""
         return {
@@ -75,12 +70,13 @@ class Passport:
         }
 
 
-def measure(adapter: Adapter, dt: float = 1e-3) -> Iterator[Measurement]:
-    """Yield the measurements of an adapter one by one.
+def passport(adapter: Adapter, dt: float = 1e-3, progress: Callable[..., None] = lambda *_: None) -> Passport:
+    """Return all measurements of an adapter.
 
     Parameters
     ----------
     dt : float - step [s], in [1e-5, 1e-2]
+    progress : callable - called with the number made, the number of all, and the name of what was measured
 
     Raises
     ------
@@ -89,16 +85,15 @@ def measure(adapter: Adapter, dt: float = 1e-3) -> Iterator[Measurement]:
     """
     if not 1e-5 <= dt <= 1e-2:
         raise ValueError(f"dt = {dt!r} s is outside [1e-05, 0.01]")
-    for name, function in (MEASURES if adapter.ask_line is None else MEASURES | LINE_MEASURES).items():
+    measures = MEASURES if adapter.ask_line is None else MEASURES | LINE_MEASURES
+    measurements = []
+    for name, measure in measures.items():
         try:
-            yield function(adapter, dt)
+            measurements.append(measure(adapter, dt))
         except AdapterError as error:
             raise AdapterError(f"{adapter.name}: {name}: {error}") from None
-
-
-def passport(adapter: Adapter, dt: float = 1e-3) -> Passport:
-    """Return all measurements of an adapter; arguments and errors are those of ``measure``."""
-    return Passport(adapter.name, adapter.settings, dt, tuple(measure(adapter, dt)))
+        progress(len(measurements), len(measures), name)
+    return Passport(adapter.name, adapter.settings, dt, tuple(measurements))
 
 
 def contract(adapter: Adapter, dt: float) -> Measurement:

@@ -29,7 +29,7 @@ def add_bounce(commands: Any) -> None:
 
 def command_bounce(options: argparse.Namespace) -> int:
     """Measure, print one line per property, write the requested files; the status is 0 whatever the remarks."""
-    from flipproof.bounce.passport import Passport, measure
+    from flipproof.bounce.passport import passport
     from flipproof.bounce.specs import load
 
     check_outputs(options, "json", "plot")
@@ -38,18 +38,14 @@ def command_bounce(options: argparse.Namespace) -> int:
     passports = []
     for adapter in map(load, options.adapter):
         print(inert(adapter.name) + f", step {options.dt:g} s")
-        measurements = []
         with progress_bar(adapter.name, "measurement") as progress:
-            for measurement in measure(adapter, options.dt):
-                measurements.append(measurement)
-                progress(len(measurements), max(len(measurements) + 1, 9), measurement.name)
+            passports.append(passport(adapter, options.dt, progress))
         print(inert("".join(f"  {name} = {value}\n" for name, value in adapter.settings.items())), end="")
-        for measurement in measurements:
+        for measurement in passports[-1].measurements:
             print(inert(f"{'!' if measurement.remark else ' '} {measurement.name:<14} {measurement.sentence}"))
             if measurement.remark:
                 print(inert(f"  {'':<14} {measurement.remark}"))
-        passports.append(Passport(adapter.name, adapter.settings, options.dt, tuple(measurements)))
-    write_json(options.json, {"passports": [passport.to_mapping() for passport in passports]})
+    write_json(options.json, {"passports": [made.to_mapping() for made in passports]})
     if options.plot:
         from flipproof.bounce.figure import picture
 
