@@ -74,8 +74,9 @@ def read_curve(path: Path) -> Curve:
         raise ValueError(f"{path}: the header has no column {missing}; it has {shortened(', '.join(names), 80)}")
     notes: tuple[str, ...] = ()
     release = 0.0
-    if flight := flight_in(path, names, rows):
-        rows, release, notes = flight.rows, flight.release, (flight.words,)
+    if {*IN_FLIGHT} <= {*names}:
+        rows, release = _flight_in(path, names, rows)
+        notes = (f"{path}: rows in flight, times from the release at {release:.6g} s",)
     series: dict[str, tuple[FloatArray, FloatArray]] = {}
     for name in quantities:
         t, values = _series(path, names, rows, name)
@@ -103,33 +104,16 @@ def _series(path: Path, names: list[str], rows: Rows, name: str) -> tuple[FloatA
     return samples[:, 0], samples[:, 1]
 
 
-@dataclass(frozen=True, slots=True)
-class Flight:
-    """The rows of a measured track that are its flight, and its release and last frame [s] by the table's clock.
-
-    ``words`` say that these rows alone are taken.
-    """
-
-    rows: Rows
-    release: float
-    last: float
-    words: str
-
-
-def flight_in(path: Path, names: list[str], rows: Rows) -> Flight | None:
-    """Return the flight of a measured track, released when t / T is 0; None if the table does not say what flies.
+def _flight_in(path: Path, names: list[str], rows: Rows) -> tuple[Rows, float]:
+    """Return the rows in flight of a measured track and its release [s], where t / T is 0.
 
     Raises ValueError if fewer than 2 rows are in flight.
     """
-    if not all(name in names for name in IN_FLIGHT):
-        return None
     rows = [(line, cells) for line, cells in rows if cells[names.index(IN_FLIGHT[0])].strip() == "1"]
     t, share = _series(path, names, rows, IN_FLIGHT[1])
     if len(t) < 2 or not share[-1] > share[0]:
         raise ValueError(f"{path}: fewer than 2 rows are in flight (columns {' and '.join(IN_FLIGHT)})")
-    release = float(t[0] - share[0] * (t[-1] - t[0]) / (share[-1] - share[0]))
-    words = f"{path}: rows in flight, times from the release at {release:.6g} s"
-    return Flight(rows, release, float(t[-1]), words)
+    return rows, float(t[0] - share[0] * (t[-1] - t[0]) / (share[-1] - share[0]))
 
 
 def read_cells(path: Path) -> tuple[list[str], Rows]:
