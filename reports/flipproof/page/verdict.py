@@ -400,7 +400,7 @@ def _bars(summary: Summary) -> list[SimpleNamespace]:
 
 
 def _experiment(summary: Summary, id_: str) -> SimpleNamespace | None:
-    shown = {"landing-angle": degrees, "change-of-behaviour": rounded}.get(id_, rounded)
+    shown = degrees if id_ == "landing-angle" else rounded
     place = f"paper/experiment/{id_}/equations"
     if summary.at(f"paper/experiment/{id_}") is None:
         return None
