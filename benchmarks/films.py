@@ -103,12 +103,12 @@ def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
         print(level, "|", "; ".join(words))
 
 
-def rough(spoiled: int, noise: int, slices: int) -> None:
+def rough(spoiled: int, noise: int, first: int, slices: int) -> None:
     """Print how spoiled and random films end: an estimate that holds the truth, one that does not, a refusal."""
     outcome = Counter[str]()
     for k in range(spoiled + noise):
-        rng = np.random.default_rng([99, k])
-        made = drawn(rng, {"fps": (30, 60)[k % 2], "noise": 1e-3, "tilt": 3.0}, slices)
+        rng = np.random.default_rng([99, first + k])
+        made = drawn(rng, {"fps": (30, 60)[(first + k) % 2], "noise": 1e-3, "tilt": 3.0}, slices)
         film = (film_simulator.spoiled if k < spoiled else film_simulator.noise)(rng, film_of(made))
         try:
             judged = Assessment(estimate(film, Scenario().with_slices(slices)))
@@ -212,6 +212,6 @@ if __name__ == "__main__":
     elif options.given:
         widths(options.given, options.first, options.slices)
     elif options.spoiled or options.noise:
-        rough(options.spoiled, options.noise, options.slices)
+        rough(options.spoiled, options.noise, options.first, options.slices)
     else:
         coverage(options.films, options.first, options.slices, options.fps)
