@@ -243,6 +243,11 @@ COUNT: Final = 16
 """Throws of a seed: they hold every level, and eight of nine pairs of levels of two factors."""
 
 
+FINER: Final = tuple(level + 2 for level in LEVELS[-1])
+MARGINAL: Final = 4.0
+"""Levels at which an error is confirmed that exceeds its room by less than this factor at the finest of ``LEVELS``."""
+
+
 def designed(rng: np.random.Generator) -> list[list[int]]:
     """Return the levels of ``COUNT`` throws, one index per factor: each is the one of 100 with the most new pairs."""
     sizes, covered, rows = [len(levels) for levels in FACTORS.values()], set[tuple[int, ...]](), []
@@ -561,11 +566,18 @@ def confirmed(
     """Return the comparison of a wrong throw at the finest levels.
 
     A step that something else limits, such as an output time or a longest step, is the same at all coarse levels: its
-    error does not show there as a change.
+    error does not show there as a change. Where impacts wait for the grid, errors fall by leaps: three levels may agree
+    by chance, so that what exceeds its room by little is asked for at ``FINER`` ones, unless they take too long.
     """
     if traits.refined_by is None or knobs.frozen or comparison.error:
         return comparison
-    (comparison,) = yield from comparing(traits, [knobs], seed, equation, unrefined, LEVELS[-1:])
+    for levels in (LEVELS[-1], FINER):
+        (finer,) = yield from comparing(traits, [knobs], seed, equation, unrefined, [levels])
+        if levels is FINER and finer.error:
+            break
+        comparison = finer
+        if comparison.excess == 0.0 or comparison.excess > MARGINAL or comparison.error:
+            break
     return comparison
 
 

@@ -24,6 +24,7 @@ from flipproof.foreign.elsewhere import (
     COUNT,
     FACTORS,
     FULL,
+    MARGINAL,
     PAPER,
     SEED,
     SLOW,
@@ -350,6 +351,15 @@ def judged(kind, knobs):
     solver = InProcess(kind(), "x")
     (found,) = drive(comparing(solver.traits, [knobs], SEED, "free-flight", 0.01), solver)
     return solver, found
+
+
+def test_errors_that_fall_by_leaps_are_confirmed_at_finer_steps():
+    """Impacts that wait for the grid: three levels agree by chance, and are wrong by more than they differ."""
+    solver = InProcess(LISTS["right"]["frozen_grid"].solver(), "x")
+    knobs = next(k for k in drawn(SEED) if (k.slices, k.restitution, k.damping, k.frozen) == (2, 0.0, 0.0, False))
+    (found,) = drive(comparing(solver.traits, [knobs], SEED, "eq8", 0.01), solver)
+    assert 1.0 < found.excess < MARGINAL
+    assert not drive(confirmed(solver.traits, knobs, found, SEED, "eq8", 0.01), solver).wrong
 
 
 def test_a_step_that_is_capped_hides_its_error_and_is_not_accused_of_it():
