@@ -244,8 +244,7 @@ COUNT: Final = 16
 
 
 FINER: Final = tuple(level + 2 for level in LEVELS[-1])
-MARGINAL: Final = 4.0
-"""Levels at which an error is confirmed that exceeds its room by less than this factor at the finest of ``LEVELS``."""
+"""Levels at which the errors of a weak solver are confirmed."""
 
 
 def designed(rng: np.random.Generator) -> list[list[int]]:
@@ -566,8 +565,8 @@ def confirmed(
     """Return the comparison of a wrong throw at the finest levels.
 
     A step that something else limits, such as an output time or a longest step, is the same at all coarse levels: its
-    error does not show there as a change. Where impacts wait for the grid, errors fall by leaps: three levels may agree
-    by chance, so that what exceeds its room by little is asked for at ``FINER`` ones, unless they take too long.
+    error does not show there as a change. Where impacts wait for the grid, large errors fall by leaps, and three
+    levels may agree by chance: if the own error is still ``WEAK``, ``FINER`` ones are asked, unless they take too long.
     """
     if traits.refined_by is None or knobs.frozen or comparison.error:
         return comparison
@@ -576,7 +575,7 @@ def confirmed(
         if levels is FINER and finer.error:
             break
         comparison = finer
-        if comparison.excess == 0.0 or comparison.excess > MARGINAL or comparison.error:
+        if not comparison.wrong or comparison.own_error < WEAK:
             break
     return comparison
 
