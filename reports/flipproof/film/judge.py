@@ -193,7 +193,7 @@ class Assessment:
             if abs(estimate.best["tilt"]) > 90.0:
                 raise UnsoundError(
                     f"{film.label}: gravity points up in the picture, {abs(estimate.best['tilt']):.0f} degrees from "
-                    "down: y points up, not down as in an image's pixels"
+                    "down: check that y points up, not down as in the pixels of an image"
                 )
             low, high = estimate.interval("g", 0.9999)
             if not held.scale and not low - SCALE_ERROR * GRAVITY <= GRAVITY <= high + SCALE_ERROR * GRAVITY:
@@ -345,11 +345,14 @@ class Assessment:
 
 
 class Jumps(NamedTuple):
-    """How both ends jump together from one frame to the next with both clicked, (P,) each.
+    """How far both ends jump together between frames in which both are clicked, (Q,) each, a row a pair of frames.
 
-    A jump is what a move exceeds that at the mean velocity of the moves before and after it, an end's own. ``begin``
-    and ``end`` are the two frames [s], ``until`` the last that is used, ``gap`` the longest move of the end that was
-    clicked more densely.
+    Parameters
+    ----------
+    size : [m] - by which the move of both ends exceeds one at the mean velocity of the moves before and after it
+    alike : whether they jump alike, and both stay where they jumped
+    begin, end, until : [s] - the two frames, and the last click that is used
+    gap : [s] - between clicks, at the longest, of the end that was clicked more densely
     """
 
     size: FloatArray
@@ -361,7 +364,7 @@ class Jumps(NamedTuple):
 
 
 def common_jumps(t: FloatArray, ends: FloatArray) -> Jumps:
-    """Return the jumps of both ends, (2, P, 2) with NaN where a click is missing."""
+    """Return the jumps of cap and base ``ends`` (2, P, 2) [m], NaN where a click is missing, at times ``t`` (P,)."""
     clicked: NDArray[np.bool_] = np.asarray(~np.isnan(ends).any(axis=2))
     both = np.flatnonzero(clicked.all(axis=0))
     pairs = np.array([both[:-1], both[1:]])

@@ -60,6 +60,9 @@ LEVELS: Final = ((-1.3, -1.9, -2.6), (1, 0.4, -0.3), (3, 2.4, 1.7))
 No step is a multiple of another, so that no two share output times by chance.
 """
 
+FINER: Final = tuple(level + 2 for level in LEVELS[-1])
+"""Levels at which the errors of a weak solver are confirmed, with a quarter of the finest steps."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Knobs:
@@ -241,10 +244,6 @@ SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
 
 COUNT: Final = 16
 """Throws of a seed: they hold every level, and eight of nine pairs of levels of two factors."""
-
-
-FINER: Final = tuple(level + 2 for level in LEVELS[-1])
-"""Levels at which the errors of a weak solver are confirmed."""
 
 
 def designed(rng: np.random.Generator) -> list[list[int]]:
@@ -566,17 +565,15 @@ def confirmed(
 
     A step that something else limits, such as an output time or a longest step, is the same at all coarse levels: its
     error does not show there as a change. Where impacts wait for the grid, large errors fall by leaps, and three
-    levels may agree by chance: if the own error is still ``WEAK``, ``FINER`` ones are asked, unless they take too long.
+    levels may agree by chance: a solver whose own error is still ``WEAK`` is asked at ``FINER`` ones, and compared
+    there if it answers.
     """
     if traits.refined_by is None or knobs.frozen or comparison.error:
         return comparison
-    for levels in (LEVELS[-1], FINER):
-        (finer,) = yield from comparing(traits, [knobs], seed, equation, unrefined, [levels])
-        if levels is FINER and finer.error:
-            break
-        comparison = finer
-        if not comparison.wrong or comparison.own_error < WEAK:
-            break
+    (comparison,) = yield from comparing(traits, [knobs], seed, equation, unrefined, LEVELS[-1:])
+    if comparison.wrong and comparison.own_error >= WEAK:
+        (finer,) = yield from comparing(traits, [knobs], seed, equation, unrefined, [FINER])
+        return comparison if finer.error else finer
     return comparison
 
 
