@@ -42,9 +42,9 @@ def test_a_line_shows_no_number_that_it_does_not_know():
 
 def test_what_was_there_before_says_nothing_of_the_time_that_is_left():
     line = Line("sweep", hidden=True)
-    line.show(0.75, "3 of 4 points", found=0.5)
+    line.show(0.75, "3 of 4 points", before=0.5)
     assert line.text(20.0) == "sweep [###############-----]  75%  20 s, about 20 s left, 3 of 4 points"
-    line.show(1.0, "", found=1.0)
+    line.show(1.0, "", before=1.0)
     assert line.text(20.0) == "sweep [####################] 100%  20 s"
 
 

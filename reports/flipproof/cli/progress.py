@@ -49,16 +49,16 @@ class Line:
     """One line on standard error, drawn anew twice a second, so that it moves while nothing is reported."""
 
     def __init__(self, title: str, *, hidden: bool) -> None:
-        self._title, self._share, self._words, self._found = title, 0.0, "", 0.0
+        self._title, self._share, self._words, self._before = title, 0.0, "", 0.0
         self._began = time.monotonic()
         self._ended = threading.Event()
         self._thread = None if hidden else threading.Thread(target=self._draw_on, daemon=True)
         if self._thread:
             self._thread.start()
 
-    def show(self, share: float, words: str, found: float = 0.0) -> None:
+    def show(self, share: float, words: str, before: float = 0.0) -> None:
         """Take over the share that is done, what is done now, and the share that was there before."""
-        self._share, self._words, self._found = min(1.0, max(0.0, share)), words, found
+        self._share, self._words, self._before = min(1.0, max(0.0, share)), words, before
 
     def end(self) -> None:
         """Take the line away."""
@@ -74,7 +74,7 @@ class Line:
     def text(self, seconds: float) -> str:
         """Return the line after so many seconds."""
         full = int(WIDTH * self._share)
-        made = (self._share - self._found) / (1.0 - self._found) if self._found < 1.0 else 1.0
+        made = (self._share - self._before) / (1.0 - self._before) if self._before < 1.0 else 1.0
         parts = (f"{seconds:.0f} s", time_left(made, seconds), self._words)
         return (
             f"{self._title} [{'#' * full}{'-' * (WIDTH - full)}] {self._share:4.0%}  {', '.join(filter(None, parts))}"
@@ -91,10 +91,10 @@ def progress_bar(title: str, unit: str, *, quiet: bool = False) -> Iterator[Call
     """Give what is called with what is done, what is planned, a name and what was there before; a terminal shows it."""
     line = Line(title, hidden=quiet or not sys.stderr.isatty())
 
-    def progress(done: int, planned: int | None, label: str = "", found: int = 0) -> None:
+    def progress(done: int, planned: int | None, label: str = "", before: int = 0) -> None:
         counted = f"{done} of {planned} {unit}s" if planned else f"{done} {unit}s"
-        share, before = (done / planned, found / planned) if planned else (0.0, 0.0)
-        line.show(share, f"{counted}, {label}" if label else counted, before)
+        shares = (done / planned, before / planned) if planned else (0.0, 0.0)
+        line.show(shares[0], f"{counted}, {label}" if label else counted, shares[1])
 
     try:
         yield progress

@@ -104,14 +104,14 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
         bars.close()
         stored[:] = 0, size
         show = bars.enter_context(progress_bar(options.out.name, "point", quiet=options.quiet))
-        without = found = 0
+        without = before = 0
 
         def progress(points: int, unfinished: int, made: bool) -> None:
-            nonlocal without, found
+            nonlocal without, before
             stored[0] += points
             without += unfinished
-            found += 0 if made else points
-            show(stored[0], size, f"{without} without a whole flight" if without else "", found)
+            before += 0 if made else points
+            show(stored[0], size, f"{without} without a whole flight" if without else "", before)
             if stored[0] >= size:
                 bars.close()
 
