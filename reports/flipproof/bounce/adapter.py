@@ -28,9 +28,6 @@ from slicemodel.scenario import shortened
 
 FloatArray = NDArray[np.float64]
 Drop = Callable[[float, float, float, float, float, float], tuple[FloatArray, FloatArray, FloatArray]]
-Line = Callable[
-    [Sequence[float], Sequence[float], Sequence[float], float, float, float], tuple[FloatArray, FloatArray, FloatArray]
-]
 
 BUILT_IN: Final = ("pymunk", "mujoco", "box2d")
 """Adapters that come with flipproof (``flipproof.bounce.engines``)."""

@@ -154,8 +154,9 @@ class RunResult:
     @property
     def plateau(self) -> float:
         """Mean of omega / omega_0 over the second half of the flight; NaN if the run did not reach its end."""
-        run = self.trajectory
-        return math.nan if run is None or not run.ok else plateau(run.t, run.omega, run.scenario.omega0)
+        if self.problem:
+            return math.nan
+        return plateau(self.flight.t, self.flight.omega, self.flight.scenario.omega0)
 
 
 def make(run: Run) -> RunResult:

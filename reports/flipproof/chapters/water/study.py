@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -188,17 +189,17 @@ def _run(equation: str, filling: float, ask: Ask) -> Run:
 
 
 def _early(result: RunResult) -> float:
-    run = result.trajectory
-    if run is None or not run.ok:
-        return float("nan")
+    if result.problem:
+        return math.nan
+    run = result.flight
     below = np.flatnonzero(run.omega / run.scenario.omega0 < 0.75)
     return float(run.t[below[0]]) if below.size else float("nan")
 
 
 def _apart(result: RunResult, curve: list[float]) -> float:
-    run = result.trajectory
-    if run is None or not run.ok:
-        return float("nan")
+    if result.problem:
+        return math.nan
+    run = result.flight
     times = np.linspace(0.0, run.scenario.duration, len(curve))
     omega = np.interp(times, run.t, run.omega) / run.scenario.omega0
     return float(np.sqrt(np.mean((omega - np.array(curve)) ** 2)))
