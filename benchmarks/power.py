@@ -28,7 +28,7 @@ from flipproof.foreign.contract import Answer, Ask, ForeignError
 
 BLIND: Final = (
     "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh",
-    "twelfth", "thirteenth", "fourteenth", "fifteenth", "sixteenth", "seventeenth",
+    "twelfth", "thirteenth", "fourteenth", "fifteenth", "sixteenth", "seventeenth", "eighteenth",
 )  # fmt: skip
 """Lists by people who had not seen the checks."""
 
@@ -48,6 +48,8 @@ MISSED: Final = (
     "fixed_inside_releases_the_base_only", "mirrored_hit_put_on_the_end", "adams_ratio_upside_down",
     "single_angle_too", "adaptive_first_slope_kept", "single_heun3_drag_does_not_turn", "lists_peek_keeps_rests",
     "series_rests_too_soon", "single_midpoint_parabola_without_two", "angle_rk4_lifted_at_old_angle",
+    "kick_drift_hit_at_mid_step_speed", "angle_rk4_sticks_early", "frozen_grid_never_lies",
+    "single_midpoint_compensation_added", "kick_drift_stopped_momentum_lost", "series_weak_pushes_hold_nothing",
 )  # fmt: skip
 """Mistakes known to be missed."""
 
