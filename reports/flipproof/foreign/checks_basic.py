@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from flipproof.foreign import elsewhere
-from flipproof.foreign.causes import parts_of_inertia
+from flipproof.foreign.causes import parts_of_inertia, rms
 from flipproof.foreign.checking import (
     CALM,
     SMOOTH,
@@ -50,6 +50,11 @@ SPREAD: Final = np.array([0.9, 0.7, 0.3, 0.2]) * THROW.bottle.length
 """Starting places from which slices strike both ends."""
 SPREAD.setflags(write=False)
 
+STARTS: Final = np.array([[0.9, 0.7, 0.3, 0.2], [0.8, 0.6, 0.6, 0.5], [0.9, 0.9, 0.8, 0.7], [0.4, 0.3, 0.2, 0.1]])
+STARTS *= THROW.bottle.length
+"""Starting places of different means and spreads, shape (4, N)."""
+STARTS.setflags(write=False)
+
 
 def check_start(traits: Traits) -> CheckGenerator:
     """At t = 0 the bottle has the angle and the angular velocity of the throw, and the slices their places."""
@@ -73,6 +78,9 @@ def check_start(traits: Traits) -> CheckGenerator:
     cached = ask is asks[-1] and (worst == "omega" or np.array_equal(answer.omega, answers[0].omega))
     from_slope = worst == "omega" and not cached and bound < errors[worst] < 0.05
     hint = _places_advice(ask, answer) if worst == "r" and answer.r is not None else ""
+    turns = (answer.theta[0] - throw.theta0) / (2 * np.pi)
+    if worst == "theta" and round(turns) and abs(turns - round(turns)) < 1e-6:
+        hint = "theta is off by whole turns: do not wrap it"
     initial = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
     few_digits = _digits_advice(worst, initial[worst][0], float(initial[worst][1][0])) if worst in initial else ""
     return Observation(
@@ -247,20 +255,19 @@ def check_times(traits: Traits) -> CheckGenerator:
 
 
 def _outputs_advice(traits: Traits, sparse: Answer, dense_omega: FloatArray) -> elsewhere.TextGenerator:
-    """Return what to look at if omega is right at dense output times and wrong at sparse ones."""
+    """Return what to look at if omega is right at dense output times or without weight or drag, and else wrong."""
     try:
         equation = name_of(switches_of(traits.equation or ""))
     except ValueError:
         return ""
     exact = curve(equation, SMOOTH, sparse.t).omega
     sparse_error, dense_error = (float(np.max(np.abs(omega - exact))) for omega in (sparse.omega, dense_omega))
-    if sparse_error < 4 * dense_error:
-        return ""
+    close = "right where outputs lie close" if sparse_error >= 4 * dense_error else ""
     answers = yield [replace(ask_of(traits, throw), times=sparse.t) for throw in CALM.values()]
     for (name, throw), answer in zip(CALM.items(), answers, strict=True):
         if np.max(np.abs(answer.omega - curve(equation, throw, sparse.t).omega)) < sparse_error / 10:
-            return f"right where outputs lie close, and {elsewhere.right_without(name)}"
-    return "right where outputs lie close: look at what goes on between two of them, such as J, omega and theta; "
+            return f"{close and f'{close}, and '}{elsewhere.right_without(name)}"
+    return close and f"{close}: look at what goes on between two of them, such as J, omega and theta; "
 
 
 def check_ice(traits: Traits) -> CheckGenerator:
@@ -289,9 +296,7 @@ def check_ice(traits: Traits) -> CheckGenerator:
         expected=f"{expected[worst]} within {bounds[worst]:.1g}",
         observed=f"{worst} off by {errors[worst].max():.2g}",
         where=f"scenario.frozen = True, {time_of_max(ask.times, errors[worst])}",
-        advice=(
-            _rate_advice((answer.theta - THROW.theta0)[1:] / turned[1:]) if worst == "theta" and not wrapped else ""
-        )
+        advice=(_turning_advice(answer.theta - THROW.theta0, turned) if worst == "theta" and not wrapped else "")
         or _ice_advice(worst, wrapped, right_at_first=float(errors["theta"][0]) <= bounds["theta"]),
         facts={"drift": float(errors["omega"].max())},
     )
@@ -311,22 +316,31 @@ def _ice_advice(worst: str, wrapped: bool, *, right_at_first: bool) -> str:
     )
 
 
-def _rate_advice(rates: FloatArray) -> str:
-    """Return that theta advances by a constant fraction of omega t, if it does."""
-    excess = float(np.median(rates)) - 1.0
-    if abs(excess) < 1e-9 or float(np.ptp(rates)) > 1e-3 * abs(excess):
-        return ""
-    return (
-        f"theta advances by {1.0 + excess:.6g} omega dt in every step: look for weights that do not add up to 1, or at "
-        "the inertia by which theta is advanced"
-    )
+def _turning_advice(theta: FloatArray, turned: FloatArray) -> str:
+    """Return that theta of ice advances at another rate, from another angle or unevenly, if it clearly does."""
+    errors = (theta - turned)[1:]
+    if not np.any(np.diff(theta)):
+        return "theta stays what it was: ice turns, too, by omega_0 t"
+    excess = float(np.median(errors / turned[1:]))
+    if abs(excess) > 1e-9 and float(np.ptp(errors / turned[1:])) < 1e-3 * abs(excess):
+        return (
+            f"theta advances by {1.0 + excess:.6g} omega dt in every step: look for weights that do not add up to 1, "
+            "or at the length of a step, or at the inertia by which theta is advanced"
+        )
+    if float(np.ptp(errors)) < 1e-3 * abs(float(np.median(errors))):
+        return f"theta is off by {np.median(errors):.3g} rad at all later times: let theta go on from theta_0"
+    growth = np.diff(errors)
+    if abs(np.sum(np.sign(growth))) == len(growth) and np.max(np.abs(np.diff(growth))) < 0.2 * np.max(np.abs(growth)):
+        return "the rate of theta changes smoothly, as if J did: see that no slice moves within a step of ice"
+    return ""
 
 
 def check_angle(traits: Traits) -> CheckGenerator:
     """theta is the integral of omega over time, also late in a long flight."""
     asks = _refined(traits, 961)
     slow_ask = ask_of(traits, SLOW, 0, 961)
-    slow_end_ask = replace(ask_of(traits, SLOW, 2 if traits.refined_by else 0), times=slow_ask.times[-1:])
+    slow_level = 2 if traits.refined_by else 0
+    slow_end_ask = replace(ask_of(traits, SLOW, slow_level), times=slow_ask.times[-1:])
     *answers, slow, slow_end = yield [*asks, slow_ask, slow_end_ask]
     errors = []
     for a in (*answers, slow):
@@ -340,17 +354,22 @@ def check_angle(traits: Traits) -> CheckGenerator:
     holds = sizes[0] <= bound or (_falls(sizes, min_ratio) and sizes[-1] <= 100 * bound)
     hint = "" if holds else _times_advice(answers[0]) or _jump_advice(asks[0].times, answers[0].omega / THROW.omega0)
     if not (holds or hint):
-        hint = _lag_advice(asks[0], answers[0])
+        hint = _lag_advice(asks[0], answers[0]) or _stale_advice(answers[0])
     stops = holds and (slow_error > 100 * max(bound, sizes[0]) or slow.theta[-1] == slow.theta[-2])
     end_differs = abs(slow_end.theta[-1] - slow.theta[-1]) > 0.2 * abs(slow.theta[-1] - slow.theta[0])
     stall_advice = _times_advice(slow) if stops and np.any(np.diff(slow.theta[: np.argmax(slow.theta)]) == 0.0) else ""
     if holds and not stops and end_differs:
+        calm = [ask_of(traits, replace(SLOW, gravity=0.0), 0, 961)]
+        calm += [replace(ask_of(traits, calm[0].scenario, slow_level), times=slow_end_ask.times)]
+        ends = [float(answer.theta[-1]) for answer in (yield calm)]
+        weightless = abs(ends[1] - ends[0]) < 0.01 * abs(slow_end.theta[-1] - slow.theta[-1])
         return Observation(
             holds=False,
             expected="the same theta, whatever other times are asked",
             observed=f"theta = {slow_end.theta[-1]:.4g} rad instead of {slow.theta[-1]:.4g} rad",
             where=f"flight of {SLOW.duration:g} s, asked at its end alone instead of at 961 times",
-            advice=_end_advice(slow_ask, slow_end.theta[-1] - slow.theta[-1], slow_end.theta[-1]),
+            advice=(elsewhere.right_without("weight") if weightless else "")
+            + _end_advice(slow_ask, slow_end.theta[-1] - slow.theta[-1], slow_end.theta[-1]),
         )
     return Observation(
         holds=holds and not stops,
@@ -365,6 +384,17 @@ def check_angle(traits: Traits) -> CheckGenerator:
         "step with an impact; or the omega answered is not the one by which theta advances",
         facts={"angle": sizes},
     )
+
+
+def _stale_advice(answer: Answer) -> str:
+    """Return that omega is that of another instant than theta, if it is, by the same time throughout."""
+    mean = (answer.omega[1:] + answer.omega[:-1]) / 2
+    missing, slope = np.diff(answer.theta) / np.diff(answer.t) - mean, np.diff(answer.omega) / np.diff(answer.t)
+    delay = float(np.sum(missing * slope) / max(float(np.sum(slope**2)), 1e-300))
+    if not rms(missing - delay * slope) < 0.3 * rms(missing):
+        return ""
+    side = "earlier" if delay > 0 else "later"
+    return f"omega is that of {abs(delay):.2g} s {side} than theta: answer both, and the inertia, of one instant; "
 
 
 def _end_advice(ask: Ask, difference: float, theta: float) -> str:
@@ -441,7 +471,7 @@ def check_definitions(traits: Traits) -> CheckGenerator:
         where=time_of_max(answer.t, errors[worst]),
         advice=_decimals_advice(answer)
         + _delay_advice(getattr(answer, worst), derived[worst])
-        + (_parts_advice(answer) if worst == "inertia" else "")
+        + (_parts_advice(answer.r, answer.inertia) if worst == "inertia" and answer.inertia is not None else "")
         + "r_cm is the centre of mass of bottle and water from the cap, J that about it with the bottle's own: "
         "look at the masses, at the bottle's own inertia, and at where the answer is put together",
     )
@@ -459,20 +489,32 @@ def _behind_advice(answer: Answer) -> str:
     return ""
 
 
+def _factor_advice(answer: Answer) -> str:
+    """Return that v is a constant times dr/dt, if it is, with what the constant may be."""
+    assert answer.r is not None
+    assert answer.v is not None
+    slope, mean = np.diff(answer.r, axis=0) / np.diff(answer.t)[:, None], (answer.v[1:] + answer.v[:-1]) / 2
+    factor = float(np.sum(slope * mean) / max(float(np.sum(slope**2)), 1e-300))
+    if abs(factor - 1.0) < 0.01 or not rms(mean - factor * slope) < 0.02 * rms(mean):
+        return ""
+    spin, length = abs(SMOOTH.omega0), SMOOTH.bottle.length
+    constants = {"-1": -1.0, "1 / omega_0": 1 / spin, "omega_0": spin, "1 / L": 1 / length, "L": length}
+    name = next((f", {name}," for name, value in constants.items() if abs(factor / value - 1.0) < 0.005), "")
+    return f"v is {factor:.4g}{name} times dr/dt throughout: look at its unit and sign; "
+
+
 def _delay_advice(answered: FloatArray, exact: FloatArray) -> str:
     """Return that the values answered belong to the previous output, if they do."""
     delayed = np.max(np.abs(answered[1:] - exact[:-1])) < 1e-3 * np.ptp(exact)
     return "it is that of the output before: answer what belongs to r of the same instant; " if delayed else ""
 
 
-def _parts_advice(answer: Answer) -> str:
+def _parts_advice(r: FloatArray, inertia: FloatArray) -> str:
     """Return which parts of the definition of J count more or less than once in the inertia answered, if any."""
-    assert answer.r is not None
-    assert answer.inertia is not None
-    parts = parts_of_inertia(THROW, answer.r)
+    parts = parts_of_inertia(THROW, r)
     columns = np.array(list(parts.values())).T
-    factors, *_ = np.linalg.lstsq(columns, answer.inertia, rcond=1e-12)
-    if np.max(np.abs(columns @ factors - answer.inertia)) > 1e-4 * np.max(answer.inertia):
+    factors, *_ = np.linalg.lstsq(columns, inertia, rcond=1e-12)
+    if np.max(np.abs(columns @ factors - inertia)) > 1e-4 * np.max(inertia):
         return ""
     wrong = [f"{name} counts {f:.3g} times" for name, f in zip(parts, factors, strict=True) if abs(f - 1.0) > 1e-3]
     return f"in J = {' + '.join(parts)}, {' and '.join(wrong)}; " if wrong else ""
@@ -527,6 +569,7 @@ def check_velocity(traits: Traits) -> CheckGenerator:
         advice=_times_advice(answers[0])
         + ("v is the same at all times: answer a copy of each state; " if constant else "")
         + _behind_advice(answers[0])
+        + _factor_advice(answers[0])
         + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )
@@ -551,6 +594,10 @@ def check_momentum(traits: Traits) -> CheckGenerator:
         simpler = [ask_of(traits, throw) for throw in SIMPLER.values()]
         drifts = [float(_drift(*pair).max()) for pair in zip(simpler, (yield simpler), strict=True)]
         advice = _right_without(drifts, max(bound, 0.03 * sizes[0]))
+        if answers[0].r is None and changes[0][0] > bound:
+            asks_of_starts = [replace(asks[0], start=start) for start in STARTS]
+            inertia = [answer.inertia for answer in (yield asks_of_starts)]
+            advice += _parts_advice(STARTS, np.array([values[0] for values in inertia if values is not None]))
     return Observation(
         holds=holds,
         weak=f"J omega is kept to {sizes[0]:.1g} only, whatever the step" if sizes[0] > bound and not falls else "",
@@ -716,11 +763,14 @@ def check_equation(traits: Traits) -> CheckGenerator:
     weak = (
         f"its own error, {own_error:.2g} of omega_0, is too large to tell equations apart" if own_error > limit else ""
     )
-    advice = "" if holds and not deviation else (yield from elsewhere.simpler_throws_advice(traits, declared))
-    if not (advice or place.on_lattice or place.still):
+    departure = cause = simpler = ""
+    if not (place.on_lattice or place.still):
         with suppress(ForeignError, NotApplicableError):
             departure, cause = yield from departing(traits, declared, [ask_of(traits, throw) for throw in THROWS])
-            advice = departure and f"there it departs {departure}; {cause and f'{cause}; '}"
+    exact = cause and "alone" not in cause and not ("besides" in cause and " and " in cause)  # names one thing
+    if not (exact or (holds and not deviation)):
+        simpler = yield from elsewhere.simpler_throws_advice(traits, declared)
+    advice = simpler or (departure and f"there it departs {departure}; {cause and f'{cause}; '}")
     advice = advice or (place.advice and f"{place.advice}; ")
     return Observation(
         holds=holds and not deviation,

@@ -434,11 +434,11 @@ def test_a_rest_that_holds_too_long_is_seen_and_named():
     solver = InProcess(held.solver(), "x")
     (result,) = certify(solver, ["equation"]).results
     assert result.verdict == FAILED
-    assert "right without weight, and without rests: look at rests" in result.line
+    assert "slices stay on an end that lets them go: look at when a slice at rest is let go" in result.line
     departures = departing(replace(solver.traits, refined_by=None), "eq8", [WHOLE.ask(0), STICKY.ask(0)])
     came, advice = drive(departures, lambda ask: solver(replace(ask, effort=ask.scenario.duration / 1000)))
     assert "in which a slice is let go" in came
-    assert advice == "look at when a slice at rest is let go"
+    assert advice == "slices stay on an end that lets them go: look at when a slice at rest is let go"
 
 
 def test_throws_are_drawn_anew_by_a_seed():
@@ -565,6 +565,12 @@ def test_another_bottle_is_seen_in_omega_alone(changed, factor, said):
     assert said in drive(simpler_throws_advice(solver.traits, "eq8"), solver)
 
 
+@pytest.mark.slow
+def test_a_speed_after_impacts_that_is_right_without_and_with_all_of_it_is_named():
+    solver = InProcess(patches("seventeenth")["frozen_grid_root_of_e"].solver(), "x")
+    assert "right where e is 0 or 1" in drive(simpler_throws_advice(solver.traits, "eq8"), solver)
+
+
 def test_an_equation_can_be_asked_for_and_what_spoils_it_is_named():
     (result,) = certify(InProcess(Subject(), "x"), ["equation"], equation="eq8").results
     assert result.verdict == FAILED
@@ -682,6 +688,16 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("dense853_reads_past_event", "piecewise", "m beyond an end: an answer between two steps must know of"),
         ("dense853_mean_of_water", "piecewise", "against mean(v), the mean velocity of the water, instead of v_CM"),
         ("adams_pece_last_impact_first", "piecewise", "whether the earliest of several comes first"),
+        ("frozen_grid_solid_cylinder", "angular-momentum", "M_b (R^2/2 + L^2/12) counts 0.945 times"),
+        ("frozen_grid_ice_from_upright", "ice", "at all later times: let theta go on from theta_0"),
+        ("frozen_grid_inertia_one_step_late", "angle", "omega is that of 0.00031 s earlier than theta"),
+        ("kick_drift_ice_does_not_turn", "ice", "ice turns, too, by omega_0 t"),
+        ("series_ice_melts_in_series", "ice", "that no slice moves within a step of ice"),
+        ("series_cosine_grows", "angle", "right without weight"),
+        ("series_gravity_of_the_release", "times", "right without weight"),
+        ("series_drag_mean_of_water", "equation", "right without drag"),
+        ("single_midpoint_v_in_scaled_time", "velocity", "v is 0.05, 1 / omega_0, times dr/dt throughout"),
+        ("angle_rk4_theta_wrapped", "start", "theta is off by whole turns"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
@@ -698,6 +714,9 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
                 ("momenta_spares_the_resting", "piecewise", "look at the part of slices at rest in the impact of"),
                 ("taylor8_last_eighth", "piecewise", "look at where in a step they are searched for"),
                 ("printed_loses_rest_of_step", "piecewise", "look at the clock, and at the rest of a step"),
+                ("series_cosine_chain", "elsewhere", "look at what goes on within a long step"),
+                ("angle_rk4_impact_at_an_angle", "elsewhere", "impacts not: look at how the answer is put together"),
+                ("angle_rk4_about_middle", "equation", "look at the centrifugal term omega^2 (r - r_cm)"),
             )
         ),
     ],
@@ -713,6 +732,8 @@ def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, 
     ("mistake", "piece", "words"),
     [
         ("by_angle_points_to_the_end", 0, "slices go on to half their height beyond an end"),
+        ("single_midpoint_reach_of_half_slice", 4, "slices go on to 0.25 of their height beyond an end"),
+        ("kick_drift_recoil_lifts_nothing", 4, "a slice keeps its velocity to the last digit, as if at rest"),
         ("halving_drag_of_momentum", 0, "x the drag alpha v_CM / m besides"),
         ("flight_ends_at_half_a_second", 1, "the answer stands still there, first at t = 0.5"),
         ("adams_not_begun_again", 1, "look at the rest of a step with an impact, and what is kept over it"),
