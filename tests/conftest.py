@@ -52,7 +52,11 @@ def cache_of_these_tests(tmp_path_factory):
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the marks
 def pytest_collection_modifyitems(items):
-    """Keep in one process, with ``--dist loadgroup``, the tests of the one report, and those that share runs."""
+    """Keep in one process, with ``--dist loadgroup``, the tests of the one report, and those that share runs.
+
+    Workers take the largest groups first, then single tests in this order: a long one at the end would be waited for.
+    """
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
     for item in items:
         made = item._fixtureinfo.name2fixturedefs
         if not made.keys().isdisjoint(("gathered", "folder", "browser")):

@@ -211,6 +211,7 @@ def test_an_outcome_is_certified_if_half_the_step_and_the_twins_end_alike(
     assert bool(told.reason) == (outcome == "undecided")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("beside", [(-2e-3, 2e-3), pytest.param((-0.03, 0.04), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", ["together", "in-turn"])
 def test_near_an_edge_between_outcomes_the_engine_certifies_nothing_false(law, beside):

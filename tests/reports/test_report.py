@@ -325,6 +325,7 @@ def test_typeset():
     assert typeset("v' = (omega^2 - gamma^2) X - 2 gamma v, gamma << omega_0") == ("v' = (ω² − γ²) X − 2 γ v, γ ≪ ω₀")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kernels", ["compiled", pytest.param("to be compiled", marks=pytest.mark.slow)])
 def test_the_real_command(tmp_path, kernels):
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

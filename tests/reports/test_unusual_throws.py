@@ -38,6 +38,7 @@ TOGETHER = ("weightless, other spin", "elastic", "full")
 """What a push throws together, and alone only among the long forms."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in TOGETHER)) for name in UNUSUAL]
 )
