@@ -782,9 +782,10 @@ def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNRE
             return f"right without weight, and through some impacts: look at rests and at {LOOK_AT['impacts']}; {onset}"
         return f"right without weight, and before half a turn: look at {LOOK_AT['weight']}, at every angle; {onset}"
     if {"rests", "impacts"} <= right.keys():
-        (sticking,) = yield from comparing(traits, [replace(whole, restitution=0.0)], 0, equation, unrefined)
-        if not sticking.wrong:  # with more rests than any other
-            return f"right where e is 0 or 1: look at the speed after an impact, e times that before; {onset}"
+        if not full.impacts_passed:
+            (sticking,) = yield from comparing(traits, [replace(whole, restitution=0.0)], 0, equation, unrefined)
+            if not sticking.wrong:  # with more rests than any other
+                return f"right where e is 0 or 1: look at the speed after an impact, e times that before; {onset}"
         return f"right through impacts as long as no slice rests: look at {LOOK_AT['rests']}; {onset}"
     for name in ("weight", "drag", "impacts"):
         if name in right:
