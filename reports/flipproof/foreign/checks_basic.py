@@ -50,8 +50,9 @@ SPREAD: Final = np.array([0.9, 0.7, 0.3, 0.2]) * THROW.bottle.length
 """Starting places from which slices strike both ends."""
 SPREAD.setflags(write=False)
 
-STARTS: Final = np.array([[0.9, 0.7, 0.3, 0.2], [0.8, 0.6, 0.6, 0.5], [0.9, 0.9, 0.8, 0.7], [0.4, 0.3, 0.2, 0.1]])
-STARTS *= THROW.bottle.length
+STARTS: Final = THROW.bottle.length * np.array(
+    [[0.9, 0.7, 0.3, 0.2], [0.8, 0.6, 0.6, 0.5], [0.9, 0.9, 0.8, 0.7], [0.4, 0.3, 0.2, 0.1]]
+)
 """Starting places of different means and spreads, shape (4, N)."""
 STARTS.setflags(write=False)
 
@@ -600,9 +601,10 @@ def check_momentum(traits: Traits) -> CheckGenerator:
         drifts = [float(_drift(*pair).max()) for pair in zip(simpler, (yield simpler), strict=True)]
         advice = _right_without(drifts, max(bound, 0.03 * sizes[0]))
         if answers[0].r is None and changes[0][0] > bound:
-            asks_of_starts = [replace(asks[0], start=start) for start in STARTS]
-            inertia = [answer.inertia for answer in (yield asks_of_starts)]
-            advice += _parts_advice(STARTS, np.array([values[0] for values in inertia if values is not None]))
+            inertia = [answer.inertia for answer in (yield [replace(asks[0], start=start) for start in STARTS])]
+            at_release = [values[0] for values in inertia if values is not None]
+            if len(at_release) == len(STARTS):
+                advice += _parts_advice(STARTS, np.array(at_release))
     return Observation(
         holds=holds,
         weak=f"J omega is kept to {sizes[0]:.1g} only, whatever the step" if sizes[0] > bound and not falls else "",
