@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
 CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("assumptions", "What each assumption costs",
-     "Each change that leads from the published program to free flight, made in every order, and what it does to ω.",
+     "What leads from the published program to free flight: its finite step, then six changes in every order, and what "
+     "each does to ω.",
      ("waterfall",)),
     ("flights", "The flights", "Every solver's flight of this throw: ω, θ, the centre of mass and the slices over "
      "time, and the bottles in motion.", ("flights",)),
@@ -30,7 +31,7 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("checks", "Whether the programs are right",
      "Published numbers, exact solutions and independent integrations are reproduced.",
      ("vectors", "exact_cases", "reference")),
-    ("ice", "Frozen water", "Ice cannot slide, so ω must stay constant: how closely every solver keeps it.", ("ice",)),
+    ("ice", "Frozen water", "Ice cannot slide, so ω must stay constant: how closely solvers keep it.", ("ice",)),
     ("engines", "The engines",
      "What each physics engine computes by itself, how far its result can be trusted, and where it fails.",
      ("certificates", "agreement", "stability", "engine_facts", "overlap")),

@@ -272,7 +272,7 @@ NAMES: Final[Mapping[str, str]] = {name: SPOKEN[name] for name in ("published-py
 
 CHANGES: Final[Mapping[str, str]] = {
     "signs of Eq. 9d: no damping": "Eq. 9d has two wrong signs, the program one: its drag does not damp.",
-    "roots of Eq. 9a: γ ≪ ω": "Eq. 9a holds for small drag; late in the flight drag is not small.",
+    "roots of Eq. 9a: γ ≪ ω": "Eq. 9a holds only while γ is small beside ω.",
     "drag against C_M": "Water rubs on the wall; Eq. 8 has it rub on the centre of mass.",
     "gravity in Eq. 8": "Eq. 8 lets gravity push the water; a falling bottle does not feel it.",
     "origin at rest, drag on the tube": "The centre of mass accelerates along the bottle, and drag pulls the bottle.",
@@ -336,6 +336,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
     summary = Summary(content)
     numbers = {name: summary.number(source, small) for name, source in SHARES.items()}
     numbers |= {name: summary.number(source, plain) for name, source in PLAIN.items()}
+    numbers["agreement_band"] = summary.number("findings/agreement/band", percent)
     numbers["threshold"] = summary.number("findings/paper-toppling-peak-geometry/value", _shown("{:.4f}"))
     # The agreement on free flight counts as that of the engines if all are there; a quick report certifies none.
     title = summary.at("findings/agreement/title") or ""
@@ -354,6 +355,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
         experiments={name: _experiment(summary, id_) for name, id_ in EXPERIMENTS.items()},
         nearest=_nearest(summary),
         water=_water(summary),
+        weight_first=summary.at("headlines/pair/what") == RUNG_NAMES["weightless"],
         map=_map(tables.get("map-gamma"), content),
         names=NAMES,
     )

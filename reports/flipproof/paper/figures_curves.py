@@ -133,7 +133,7 @@ CURVES: Final = {
         THETA,
         ("drag",),
         "what the drag α does to the angle θ(t)",
-        "The less a bottle has turned at the end, the longer its ω stayed low.",
+        "The less a bottle has turned at the end, the lower its ω was on average.",
     ),
     "6c": Curves(
         OMEGA,
@@ -155,9 +155,9 @@ CURVES: Final = {
         RELATIVE,
         ("spin",),
         "what the spin at release ω₀ does",
-        "Without the gravity that Eq. 8 keeps, the spin sets the pace, and γ/ω₀: in free flight the curves fall one "
-        "after the other, and none rises again. At 5 rad/s the published program's water does not move at all: its α "
-        "takes (α/2m)² off ω², and here the two are equal.",
+        "Without the gravity that Eq. 8 keeps, the spin sets only the pace and γ/ω₀: in free flight the curves fall "
+        "one after the other, and none rises again. At 5 rad/s the published program's water does not move at all: "
+        "its α takes (α/2m)² off ω², and here the two are equal.",
     ),
     "8b": Curves(
         RELATIVE,

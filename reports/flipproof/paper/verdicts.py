@@ -91,7 +91,7 @@ class PaperVerdicts:
         best = " and ".join(CONTEST[solver] for solver in closest_overall(self.comparisons))
         score = standing(self.comparisons)
         counted = "; ".join(
-            f"{CONTEST[solver]} agrees with {agrees} and is the closest, or level with it, for {nearest}"
+            f"{CONTEST[solver]} agrees with {agrees} and comes closest, alone or jointly, in {nearest}"
             for solver, (agrees, nearest) in sorted(score.items(), key=lambda row: row[1], reverse=True)
         )
         total, telling = len(self.comparisons), sum(comparison.discriminates for comparison in self.comparisons)

@@ -17,7 +17,7 @@ PARTING_BAND = 0.01
 
 def percent(share: float) -> str:
     """Return a fraction as the page prints it, two digits."""
-    return f"{100 * share:.2g} %"
+    return f"{100 * share:.0f} %" if abs(share) >= 0.995 else f"{100 * share:.2g} %"
 
 
 def moved(value: float, finer: float, slices: int) -> str:
@@ -59,7 +59,7 @@ class Difference:
         """The parting in words."""
         if self.parting_time is None:
             return f"stay within {percent(PARTING_BAND)} of ω₀"
-        words = f"differ by more than {percent(PARTING_BAND)} of ω₀ from t = {self.parting_time * 1e3:.1f} ms on"
+        words = f"first differ by more than {percent(PARTING_BAND)} of ω₀ at t = {self.parting_time * 1e3:.1f} ms"
         if self.parting_impact is not None:
             impact = self.parting_impact
             words += f", after slice {impact.slice} hit the {impact.end} at {impact.time * 1e3:.1f} ms"

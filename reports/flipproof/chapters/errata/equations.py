@@ -83,7 +83,7 @@ def residual_9a(gamma: float, omega: float) -> float:
 
 
 def erratum_roots(throw: Scenario) -> Erratum:
-    """Eq. 9a and 9c need gamma << omega, and the plateau is where that fails."""
+    """Eq. 9a and 9c need gamma << omega, and where omega is lowest that fails."""
     run = solve("published-python", throw, store="summary")
     slowest = float(np.abs(run.omega).min())
     gamma = throw.damping_rate
@@ -94,7 +94,7 @@ def erratum_roots(throw: Scenario) -> Erratum:
         follows="Eq. 8: exponents −γ ± √(ω² + γ²)",
         number=Number(residual_9a(gamma, slowest), "of ω²X left over", (0.0, 0.1**2)),  # γ ≪ ω: at most a tenth
         note=f"γ / ω = {gamma / start:.2f} at release (residual {residual_9a(gamma, start):.2g}), "
-        f"{gamma / slowest:.2f} on the plateau; the residual is (γ / ω)²",
+        f"{gamma / slowest:.2f} where the program's ω is lowest; the residual is (γ / ω)²",
     )
 
 
@@ -147,7 +147,7 @@ def erratum_python_sign(throw: Scenario) -> Erratum:
         prints="+ velocities / (tau omega) in front of sinh",
         follows="its own position update, differentiated: velocity damped at 2γ",
         number=Number(printed * h / position, "of the damping of its own positions", (0.99, 1.01)),
-        note=f"2γ = {2 * constants.gamma:g} /s is meant, {abs(printed):.1g} /s is what a step does",
+        note=f"2γ = {2 * constants.gamma:g} /s is meant, {printed:.1g} /s is what a step does".replace("-", "−"),
     )
 
 

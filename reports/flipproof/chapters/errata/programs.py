@@ -24,7 +24,7 @@ def erratum_matlab_damping(throw: Scenario) -> Erratum:
         prints="alpha/2/M_W/N in the position update",
         follows="γ = αN / 2M_w, as in its other three places",
         number=Number(constants.gamma_position / constants.gamma, "of γ", ROUND_OFF),
-        note="short by N²",
+        note=f"short by N², at N = {throw.n_slices}",
     )
 
 

@@ -44,7 +44,8 @@ def figures(results: LandingStudy) -> list[Exhibit]:
         exhibit(
             "landing-shares",
             "Does it stand? Water and ice over the filling",
-            f"Share of throws that end upright, {size.throws} throws a point, with Wilson's 95 % interval. "
+            f"Share of the decided throws that end upright, {size.throws} throws a point. The 95 % interval (Wilson's) "
+            "counts undecided throws both ways, and its upper end allows for another aim being better. "
             "The laws of the impact are models of one landing and are not averaged. The shaded fillings are those "
             f"that the paper calls optimal. {missed if 'A' in size.families else ''}".rstrip(),
             " ".join(share_line(results, family).replace("\n ", " ") + "." for family in size.families),

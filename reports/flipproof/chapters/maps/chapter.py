@@ -159,8 +159,8 @@ def _band_words(study: ValidityMap) -> str:
     if not len(bands):
         return ""
     return (
-        f" The plateau of free flight has a band of {np.median(bands):.1g} in the median cell and of {bands.max():.1g} "
-        f"in the worst, {BAND_WORDS}."
+        f" The plateau of free flight has a band of {np.median(bands):.1g} of ω₀ in the median cell and "
+        f"of {bands.max():.1g} in the worst, {BAND_WORDS}."
     )
 
 

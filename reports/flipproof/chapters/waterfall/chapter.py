@@ -84,8 +84,9 @@ def figures(waterfalls: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
         name="waterfall",
         title="From the published program to free flight",
         caption=f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one assumption, the mean over "
-        "all orders in which the assumptions can be mended; blue raises, orange lowers. Right: the same assumption in "
-        "single orders. Where the marks lie apart the assumptions interact, and the bar of one order is not a share. "
+        "all orders in which six can be mended after the finite step; blue raises, orange lowers. Right: the same "
+        "assumption in single orders. Where the marks lie apart the assumptions interact, and the bar of one order is "
+        "not a share. "
         "Error bars are numerical. Below the dotted line, hatched: what forbidding overlap changes, from free flight, "
         "whose slices overlap, to rods of water, which cannot. That is a difference of two models and no share.",
         alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
