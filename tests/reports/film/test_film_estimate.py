@@ -313,7 +313,7 @@ def test_a_bad_click_of_each_end_in_two_frames_is_no_jump_of_the_origin(quick):
 
 
 @pytest.mark.xdist_group("test_film_estimate")  # whose films it asks for by name
-@pytest.mark.parametrize("which", ["poor", "eq8"])
+@pytest.mark.parametrize("which", ["poor", pytest.param("eq8", marks=pytest.mark.slow)])
 def test_exchanged_ends_are_refused_whatever_flight_is_found_in_them(request, which):
     """The search would leave the beginning to the hand, and find a late release with a spin far too slow."""
     one = request.getfixturevalue(which)[1].estimate
