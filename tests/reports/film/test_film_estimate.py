@@ -209,6 +209,7 @@ def test_another_equation_is_not_said_to_explain(eq8):
     assert not judged.explained
     assert judged.discrepancy > 0.03
     assert "does not explain" in judged.conclusion
+    assert exchange_gain(judged.estimate, EXCHANGED) < -EXCHANGED
 
 
 @pytest.mark.slow
