@@ -337,7 +337,7 @@ def _turning_advice(theta: FloatArray, turned: FloatArray) -> str:
         return f"theta is that of {abs(delay):.2g} s {side} throughout: answer that of each time asked"
     growth = np.diff(errors)
     if abs(np.sum(np.sign(growth))) == len(growth) and np.max(np.abs(np.diff(growth))) < 0.2 * np.max(np.abs(growth)):
-        return "the rate of theta changes smoothly, as if J did: see that no slice moves within a step of ice"
+        return "theta advances unevenly: it is theta_0 + omega_0 t; see that no slice moves within a step of ice"
     return ""
 
 
