@@ -28,7 +28,7 @@ from flipproof.foreign.contract import Answer, Ask, ForeignError
 
 BLIND: Final = (
     "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh",
-    "twelfth", "thirteenth", "fourteenth", "fifteenth", "sixteenth", "seventeenth", "eighteenth",
+    "twelfth", "thirteenth", "fourteenth", "fifteenth", "sixteenth", "seventeenth", "eighteenth", "nineteenth",
 )  # fmt: skip
 """Lists by people who had not seen the checks."""
 
@@ -50,6 +50,7 @@ MISSED: Final = (
     "series_rests_too_soon", "single_midpoint_parabola_without_two", "angle_rk4_lifted_at_old_angle",
     "kick_drift_hit_at_mid_step_speed", "angle_rk4_sticks_early", "frozen_grid_never_lies",
     "single_midpoint_compensation_added", "kick_drift_stopped_momentum_lost", "series_weak_pushes_hold_nothing",
+    "adams_pece_history_across_release",
 )  # fmt: skip
 """Mistakes known to be missed."""
 
