@@ -179,7 +179,7 @@ def _place_cause(intervals: Sequence[Interval]) -> str:
     largest = float(shares.max())
     half = abs(largest - 0.5) < 0.01
     # A late impact would end somewhere else each time.
-    if half or np.mean(shares[outside] > 0.99 * largest) > 0.1:
+    if half or np.mean(shares[outside] > 0.999 * largest) > 0.3:
         share = "half their height" if half else f"{largest:.2g} of their height"
         return f"slices go on to {share} beyond an end: look at the places of the ends, h/2 and L - h/2"
     return (
