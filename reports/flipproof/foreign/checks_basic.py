@@ -483,11 +483,16 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     )
 
 
-def _behind_advice(answer: Answer) -> str:
-    """Return that r or v is that of the output before, if the other then goes with it."""
+def _slopes(answer: Answer) -> tuple[FloatArray, FloatArray]:
+    """Return dr/dt by differences and the mean v between outputs, each (P - 1, N) [m/s]."""
     assert answer.r is not None
     assert answer.v is not None
-    slope, mean = np.diff(answer.r, axis=0) / np.diff(answer.t)[:, None], (answer.v[1:] + answer.v[:-1]) / 2
+    return np.diff(answer.r, axis=0) / np.diff(answer.t)[:, None], (answer.v[1:] + answer.v[:-1]) / 2
+
+
+def _behind_advice(answer: Answer) -> str:
+    """Return that r or v is that of the output before, if the other then goes with it."""
+    slope, mean = _slopes(answer)
     together = float(np.quantile(np.abs(slope - mean), 0.9))
     for name, ahead, behind in (("r", mean, slope), ("v", slope, mean)):
         if float(np.quantile(np.abs(behind[1:] - ahead[:-1]), 0.9)) < 0.05 * together:
@@ -497,9 +502,7 @@ def _behind_advice(answer: Answer) -> str:
 
 def _factor_advice(answer: Answer) -> str:
     """Return that v is a constant times dr/dt, if it is, with what the constant may be."""
-    assert answer.r is not None
-    assert answer.v is not None
-    slope, mean = np.diff(answer.r, axis=0) / np.diff(answer.t)[:, None], (answer.v[1:] + answer.v[:-1]) / 2
+    slope, mean = _slopes(answer)
     factor = float(np.sum(slope * mean) / max(float(np.sum(slope**2)), 1e-300))
     if abs(factor - 1.0) < 0.01 or not rms(mean - factor * slope) < 0.02 * rms(mean):
         return ""
