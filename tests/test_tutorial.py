@@ -50,7 +50,6 @@ def lesson(tmp_path_factory):
     return folder
 
 
-@pytest.mark.long
 def test_every_step_leaves_what_the_page_says(lesson):
     for name in ("free.csv", "omega.png", "flip.txt", "my-track/index.html", "my-fit/film.png", "my-fit/allowed.png"):
         assert (lesson / name).stat().st_size > 1000, name
