@@ -330,5 +330,5 @@ def _reasons(study: ValidityMap) -> str:
 
 
 CHAPTER: Final = Chapter(
-    "maps", "For which bottles", study, claims, figures, work={"full": 20}, page=lambda _: {"slices": SLICES}
+    "maps", "For which bottles", study, claims, figures, work={"full": 15}, page=lambda _: {"slices": SLICES}
 )
