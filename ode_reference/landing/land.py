@@ -88,10 +88,8 @@ def land(
     dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
     world = world_of(touch, table, chosen)
     for step in (dt, *(dt / k for k in REFINED if dt / k >= SHORTEST)):
-        # From the twins with the step, from the touch with half of it: what both leave open is refined.
-        twins = zip(touch.twins(EDGE * step), TWINS_TOUCHING, strict=True)
-        runs = [_run(touch, world, step / 2), *(_run(twin, world._replace(touching=gap), step) for twin, gap in twins)]
-        if len({run.code for run in runs}) == 1:
+        runs = _runs_until_two_differ(touch, world, step)
+        if runs[0].code == runs[-1].code:
             break
     settings = {
         "law": None if world.rigid else chosen,
@@ -188,12 +186,22 @@ def _run(touch: Touch, world: World, dt: float) -> Landing:
     return run
 
 
+def _runs_until_two_differ(touch: Touch, world: World, step: float) -> list[Landing]:
+    """Land the twins with the step and then the touch with half of it; the first that ends otherwise is the last."""
+    runs: list[Landing] = []
+    for twin, gap in zip(touch.twins(EDGE * step), TWINS_TOUCHING, strict=True):
+        runs.append(_run(twin, world._replace(touching=gap), step))
+        if runs[0].code != runs[-1].code:
+            return runs
+    return [*runs, _run(touch, world, step / 2)]
+
+
 def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, object]) -> Outcome:
-    """Return the outcome of a run and of its twins, which start from touches that differ by ``shift``."""
+    """Return the outcome of the last run, and of the twins before it, whose touches differ from it by ``shift``."""
     from ode_reference.landing.layout import BROKEN, CAP, LYING, TIMEOUT, UPRIGHT
 
     names = {UPRIGHT: "upright", LYING: "lying", CAP: "cap"}
-    run, *twins = runs
+    run = runs[-1]
     codes = {landing.code for landing in runs}
     reason = ""
     if BROKEN in codes:
@@ -205,8 +213,7 @@ def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, objec
     elif not run.rise <= ENERGY_RISE:
         reason = f"an impact raises the energy by {run.rise:.2g} of the saddle, more than {ENERGY_RISE:g}"
     elif len(codes) > 1:
-        differing = next(twin.code for twin in twins if twin.code != run.code)
-        reason = f"a touch that differs by {100 * shift:.2g} % ends {names[differing]} instead of {names[run.code]}"
+        reason = f"touches that differ by {100 * shift:.2g} % end {names[runs[0].code]} and {names[run.code]}"
     return Outcome(
         outcome="undecided" if reason else names[run.code],
         certified=None if reason else run.time,
