@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import combinations
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -277,6 +278,9 @@ def _undisturbed(intervals: Sequence[Interval]) -> list[Interval]:
     return [i for i in intervals if not i.hits and np.array_equal(i.before, i.after)]
 
 
+WEIGHT_OF_ITS_OWN: Final = "cos(theta), in m/s^2,"
+
+
 def _motion_cause(intervals: Sequence[Interval]) -> str:
     """Return the extra terms in the acceleration of flying slices, if one to three explain it."""
     if (field := _only_field(intervals)) not in ("", "v"):
@@ -309,7 +313,7 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
             "gamma^2 (r - r_CM + g cos(theta) / omega^2)": (drag / 2) ** 2
             * (r[free] - centre + throw.gravity * np.cos(theta) / omega**2),
             "a constant, in m/s^2,": ones,
-            "cos(theta), in m/s^2,": np.cos(theta) * ones * (throw.gravity == 0),
+            WEIGHT_OF_ITS_OWN: np.cos(theta) * ones * (throw.gravity == 0),
         }
         for name, values in terms.items():
             rows.setdefault(name, []).append(values)
@@ -330,6 +334,8 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
         if best is not None and best[0] < 0.03:
             if best[1] == ("the drag alpha mean(v) / m",) and abs(best[2][0] - (1.0 - share)) < 0.02:
                 return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
+            if best[1] == (WEIGHT_OF_ITS_OWN,) and best[2][0] > 0.0:
+                return f"slices weigh as if g were {best[2][0]:.3g} m/s^2 where it is 0: take gravity from the throw"
             parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))
             return f"its slices accelerate by {parts} besides"
     return ""

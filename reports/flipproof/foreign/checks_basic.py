@@ -147,7 +147,8 @@ def check_determinism(traits: Traits) -> CheckGenerator:
 
 
 IGNORED: Final[Mapping[str, str]] = {
-    "another restitution": "; or no slice strikes an end: look at what moves them",
+    "another restitution": "; or no slice strikes an end, or each that does stays there at once: look at what moves "
+    "them, and at when a slice begins to rest",
     "another capacity of the bottle": "; the capacity gives the height of a slice, by half of which its places end "
     "before the ends of the bottle",
 }
@@ -250,7 +251,8 @@ def check_times(traits: Traits) -> CheckGenerator:
         observed=observed,
         where=f"{where}, {time_of_max(sparse_times, errors)}",
         advice=f"{advice}the flight begins at t = 0, also if that is not asked; "
-        "go exactly to each of ask.times, uneven as they are: cut the last step short, and leave nothing out",
+        "go exactly to each of ask.times, uneven as they are: cut the last step short, and leave nothing out; where an "
+        "answer between two steps is made, it must not move the state from which the next one goes on",
         facts={"times": float(errors.max())},
     )
 
@@ -525,7 +527,12 @@ def _parts_advice(r: FloatArray, inertia: FloatArray) -> str:
     factors, *_ = np.linalg.lstsq(columns, inertia, rcond=1e-12)
     if np.max(np.abs(columns @ factors - inertia)) > 1e-4 * np.max(inertia):
         return ""
-    wrong = [f"{name} counts {f:.3g} times" for name, f in zip(parts, factors, strict=True) if abs(f - 1.0) > 1e-3]
+    words = ("the bottle's about its middle", "that of the slices about their mean", "the shift to the common centre")
+    wrong = [
+        f"{name} counts {f:.3g} times ({meaning})"
+        for name, meaning, f in zip(parts, words, factors, strict=True)
+        if abs(f - 1.0) > 1e-3
+    ]
     return f"in J = {' + '.join(parts)}, {' and '.join(wrong)}; " if wrong else ""
 
 
@@ -579,6 +586,11 @@ def check_velocity(traits: Traits) -> CheckGenerator:
         + ("v is the same at all times: answer a copy of each state; " if constant else "")
         + _behind_advice(answers[0])
         + _factor_advice(answers[0])
+        + (
+            "the difference falls with the step: look at how r and v are answered between two steps; "
+            if sizes[-1] < 0.7 * sizes[0]
+            else ""
+        )
         + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
@@ -60,7 +60,7 @@ def check_digits(traits: Traits) -> CheckGenerator:
         return Observation(
             holds=digits >= required,
             expected=expected,
-            observed=f"printed with {digits} digits",
+            observed=f"printed with {digits} digits{_decimals(values.values())}",
             advice='print all digits ("%.17g")',
             weak="print all digits (%.17g)" if traits.precision in ("float64", "float32") else "",
             facts=facts | {"precision": f"{max(6, digits)} digits"},
@@ -81,6 +81,14 @@ def _digits(values: FloatArray) -> int:
         if all(float(f"{x:.{digits}g}") == x for x in numbers):
             return digits
     return 17
+
+
+def _decimals(fields: Collection[FloatArray]) -> str:
+    """Return how many decimals all numbers have, in words; empty if it is more than 8."""
+    for decimals in range(2, 9):
+        if all(np.array_equal(np.round(values, decimals), values) for values in fields):
+            return f", {decimals} decimals of every number: few digits of a small one"
+    return ""
 
 
 def check_refinement(traits: Traits) -> CheckGenerator:
@@ -199,7 +207,8 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         )
     else:
         default_advice = (
-            "a coefficient of the step, or the instant at which omega, r_CM or J are taken, costs the order"
+            "a coefficient of the step, or the instant at which omega, r_CM or J are taken, or how a step is cut to a "
+            "time asked, costs the order"
         )
     return Observation(
         holds=holds,

@@ -698,6 +698,10 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("series_drag_mean_of_water", "equation", "right without drag"),
         ("single_midpoint_v_in_scaled_time", "velocity", "v is 0.05, 1 / omega_0, times dr/dt throughout"),
         ("angle_rk4_theta_wrapped", "start", "theta is off by whole turns"),
+        ("dopri_no_parallel_axis", "definitions", "counts 0.053 times (the shift to the common centre)"),
+        ("dopri_dense_output_slope", "velocity", "look at how r and v are answered between two steps"),
+        ("printed_fixed_decimals", "digits", "6 decimals of every number"),
+        ("lists_gravity_of_earth", "piecewise", "as if g were 9.81 m/s^2 where it is 0"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
