@@ -41,7 +41,7 @@ from slicemodel.trajectory import FloatArray
 
 AXES: Final[Mapping[Axis, str]] = {"gamma": "damping", "step": "step size", "restitution": "restitution"}
 
-CHUNK: Final = 200
+CHUNK: Final = 500
 """Runs of a map that a worker makes at a time; it returns their readings alone."""
 
 COLOURS = ("#606060", "#D95F02", "#C2A500", "#7B3FB5", "#1F78B4", "#128A63", "#C2247F")
