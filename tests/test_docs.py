@@ -1,6 +1,7 @@
 """Docs that point somewhere point somewhere that exists."""
 
 import argparse
+import contextlib
 import re
 import shlex
 import subprocess
@@ -65,10 +66,28 @@ def test_every_command_of_the_readme_is_understood_and_its_files_exist():
                 assert (ROOT / word.split(":")[0]).exists(), word
 
 
+@pytest.mark.parametrize("page", [*PAGES, "CONTRIBUTING.md"])
+def test_every_command_of_the_page_is_understood(page):
+    """Lines of code, and what stands within a line if it is more than a name."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    spans = [" ".join(span.split()) for span in re.findall(r"(?<!`)`(flipproof [^`]+)`", text)]
+    commands = [shlex.split(span) for span in spans if span.count(" ") > 2]
+    for line in re.findall(r"^(?:    )?(flipproof .*)$", text, re.MULTILINE):
+        with contextlib.suppress(ValueError):  # prose with an apostrophe
+            commands.append(shlex.split(line, comments=True))
+    for _, *arguments in commands:
+        if arguments[0] in subcommands():
+            parser().parse_args(arguments)
+
+
+def subcommands():
+    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    return commands.choices
+
+
 def test_the_list_of_every_command_lacks_none():
     text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
-    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
-    assert [name for name in commands.choices if f"flipproof {name}" not in text] == []
+    assert [name for name in subcommands() if f"flipproof {name}" not in text] == []
 
 
 def test_the_site_is_built_by_one_command_and_its_links_lead_somewhere(tmp_path):

@@ -38,7 +38,7 @@ def test_many_rods_tend_to_it(filling):
     """The plateau's error is c(N) / N^2, and c jumps from even to odd N: at 0.75 between -1.3 and 1.1.
 
     The mean of two neighbours takes the jump away. At 0.9 the last of N rods lands within the plateau, at a time that
-    grows as log N: 0.25 s for 100, 0.32 s for 400, 0.41 s for 1600. From then on omega differs by 0.009 / N, and c
+    grows as log N: 0.25 s for 100, 0.32 s for 400, 0.41 s for 1600. From then on omega differs by some 0.01 / N, and c
     scatters with the place of that one rod (100 and 400 would leave 2.6e-6); until then see the next test.
     """
     limit = ode_reference.solve(throw(filling), "rods", TIMES)
@@ -60,7 +60,7 @@ def test_half_full_the_difference_is_what_the_theory_says():
     for n in (50, 100, 200):
         many = rod_stacks.solve(throw(0.5, n_slices=n)).at(TIMES[::2])[1]
         apart.append(np.abs(many - limit.omega).max() / 20.0 * n**2)
-    assert max(apart) < 2.0  # 8e-4, 2e-4, 5e-5 of omega_0 at the most
+    assert 0.6 < min(apart) <= max(apart) < 1.0  # 2.9e-4, 8.4e-5, 2.3e-5 of omega_0 at the most
 
 
 def test_a_bottle_nearly_full_is_extrapolated_until_the_last_rod_lands():
