@@ -121,6 +121,9 @@ def test_no_command_writes_over_what_it_reads(capsys, tmp_path):
     curve.write_text("t,omega\n0,20\n0.1,10\n")
     link = tmp_path / "link.csv"
     link.symlink_to(curve)
+    report = tmp_path / "report"
+    report.mkdir()
+    (report / "summary.json").write_text("{}")
     before = throw.read_text(), curve.read_text()
     for option, arguments in (
         ("--out", ("simulate", throw, "--out", throw)),
@@ -128,9 +131,12 @@ def test_no_command_writes_over_what_it_reads(capsys, tmp_path):
         ("--json", ("compare", curve, "eq8", "--json", link)),
         ("--json", ("check", throw, "--only", "ice", "--json", throw)),
         ("--out", ("export", throw, "--solver", "eq8", "--out", throw)),
+        ("--json", ("diff", report, report, "--json", report / "summary.json")),
+        ("--json", ("check", throw, "--baseline", report, "--json", report / "summary.json")),
     ):
         refused(capsys, (f"error: {option} ", " is a file that this command reads; name another"), *arguments)
     assert (throw.read_text(), curve.read_text()) == before
+    assert (report / "summary.json").read_text() == "{}"
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Two curves compared: what of them, at which times, under which names, and with which status."""
 
+import json
 import re
 import xml.etree.ElementTree as ElementTree
 
@@ -132,6 +133,12 @@ def test_without_omega_the_tolerance_is_of_theta():
 def test_what_cannot_be_compared_is_said_in_one_line(capsys, tmp_path, first, second, words):
     a, b = written(tmp_path / "a.csv", first), written(tmp_path / "b.csv", second)
     refused(capsys, words, "compare", a, b)
+
+
+def test_without_a_tolerance_nothing_is_claimed(capsys, tmp_path):
+    file = tmp_path / "differences.json"
+    command(capsys, "compare", "eq8", "published-limit", "--slices", "3", "--json", file)
+    assert {finding["kind"] for finding in json.loads(file.read_text())["findings"]} == {"observation"}
 
 
 def test_a_junit_file_that_could_say_nothing_is_refused(capsys):

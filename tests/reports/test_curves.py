@@ -2,6 +2,7 @@
 
 import json
 import sys
+import warnings
 
 import curves as benchmark
 import numpy as np
@@ -38,6 +39,13 @@ def test_what_lies_beyond_the_horizon_is_no_difference_and_what_lies_before_is_o
     wrong = compare(base, of(np.sin(T) + 2e-3 * (horizon - 0.1 < T)), twins=[twin])
     assert not wrong.passed
     assert wrong.parted == pytest.approx(horizon - 0.1, abs=0.02)
+
+
+def test_numbers_as_large_as_there_are_differ_without_a_warning():
+    large = of([1e308, -1e308, 1e308], t=np.arange(3.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert not compare(of([1.0, 2.0, 3.0], t=np.arange(3.0)), large).passed
 
 
 def test_nothing_comparable_fails():

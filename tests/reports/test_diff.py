@@ -170,6 +170,10 @@ def test_a_finding_differs_beyond_its_bands_and_is_not_comparable_without_one(ol
     assert (None if change is None else change.kind) == kind
 
 
+def test_a_value_that_vanished_has_moved():
+    assert change_of(finding(), {**finding(), "value": None}).words == "1 m → –"
+
+
 def test_the_tolerance_is_added_to_every_band():
     assert change_of(finding(), finding(value=1.25), 0.06) is None
     assert change_of(finding(), finding(value=1.25), 0.04).kind == "moved"

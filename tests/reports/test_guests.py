@@ -249,7 +249,11 @@ def test_a_dead_worker_costs_its_guest(monkeypatch):
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [(["--with", "nowhere.py:solve"], "there is no file nowhere.py"), (["--with", RK4] * 2, "is there twice")],
+    [
+        (["--with", "nowhere.py:solve"], "there is no file nowhere.py"),
+        (["--with", RK4] * 2, "is there twice"),
+        (["--with", "eq8"], "--with eq8 names flipproof's own solver; flipproof certify eq8 tests it"),
+    ],
 )
 def test_a_spec_that_names_nothing_is_refused_before_the_work(capsys, tmp_path, arguments, said):
     assert cli.main(["report", "--out", str(tmp_path / "r"), *arguments]) == 2

@@ -91,7 +91,16 @@ def test_the_command_writes_the_folder_and_refuses_ice(tmp_path, capsys):
     throw.write_text(THROW.to_toml())
     assert command(capsys, "scene", throw, "--slices", "3", "--out", tmp_path / "scene")[0] == 0
     assert {path.name for path in (tmp_path / "scene").iterdir()} == {
-        "scene.xml", "scene.json", "answers.csv", "readback.py",
+        ".flipproof", "scene.xml", "scene.json", "answers.csv", "readback.py",
     }  # fmt: skip
+    assert command(capsys, "scene", throw, "--format", "urdf", "--out", tmp_path / "scene")[0] == 0
+    assert not (tmp_path / "scene" / "scene.xml").exists()
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "scene.json").write_text("mine")
+    refused(capsys, "mine holds scene.json and not flipproof's own marker", "scene", throw, "--out", tmp_path / "mine")
+    asked = [sys.executable, tmp_path / "scene" / "readback.py"]
+    assert b"usage: python readback.py mujoco" in subprocess.run(asked, capture_output=True, check=False).stderr
     throw.write_text("[scenario]\nfrozen = true\n")
     refused(capsys, "frozen", "scene", throw, "--out", tmp_path / "ice")
+    throw.write_text("[scenario]\nduration = 1e9\n")
+    refused(capsys, "stalled: free-flight: stiff", "scene", throw, "--slices", "3", "--out", tmp_path / "long")

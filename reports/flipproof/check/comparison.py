@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,7 +146,7 @@ def _times(both: Comparison) -> str:
 
 
 def claims(comparison: Comparison, tolerance: float) -> tuple[Finding, ...]:
-    """Return the largest differences as findings; the first quantity is held to the tolerance, others are observed."""
+    """Return the largest differences as findings: the first is held to a finite tolerance, the others are observed."""
     findings: list[Finding] = []
     for k, gap in enumerate(comparison.apart):
         largest, time = gap.largest
@@ -153,5 +154,7 @@ def claims(comparison: Comparison, tolerance: float) -> tuple[Finding, ...]:
         unit = "of omega_0" if gap.quantity == "omega" else UNITS[gap.quantity]
         claim = f"compare-{gap.quantity.replace('_', '-')}", title, largest, unit
         note = f"at t = {time:.6g} s"
-        findings.append(observed(*claim, note) if k else regression(*claim, (0.0, tolerance), note))
+        findings.append(
+            observed(*claim, note) if k or math.isinf(tolerance) else regression(*claim, (0.0, tolerance), note)
+        )
     return tuple(findings)

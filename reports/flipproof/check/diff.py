@@ -186,6 +186,8 @@ def change_of(old: Mapping[str, Any], new: Mapping[str, Any], tolerance: float =
     if old["unit"] != new["unit"]:
         return Change(kind="moved", id=name, words=f"{_value(old)} → {_value(new)}")
     first, second = number(old["value"]), number(new["value"])
+    if (first is None) != (second is None):
+        return Change(kind="moved", id=name, words=f"{_value(old)} → {_value(new)}")
     moved = first is not None and second is not None and not within(first, second, bands(old, new) + tolerance)
     if moved and (_bands(old, new) or not (math.isfinite(first or 0.0) and math.isfinite(second or 0.0))):
         return Change(kind="moved", id=name, words=_moved(old, new))

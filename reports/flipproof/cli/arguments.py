@@ -71,11 +71,14 @@ def add_guests(command: argparse.ArgumentParser, purpose: str) -> None:
 
 
 def check_guests(specs: Sequence[str]) -> None:
-    """Refuse by a ValueError, before the work begins, a spec that names nothing or is there twice; nothing runs."""
+    """Refuse by a ValueError, before the work begins, what names nothing, one of our solvers, or one twice."""
+    from flipproof.foreign.specs import is_foreign
     from flipproof.frame.solvers import find
 
     for spec in specs:
         find(spec)
+        if not is_foreign(spec):
+            raise ValueError(f"--with {spec} names flipproof's own solver; flipproof certify {spec} tests it")
         if specs.count(spec) > 1:
             raise ValueError(f"--with {spec} is there twice")
 
@@ -158,6 +161,8 @@ def _read_by(texts: Sequence[str]) -> Iterator[Path]:
     for text in texts:
         if os.path.isfile(text):
             yield Path(text)
+        if os.path.isdir(text):  # such as a report's
+            yield from (file for file in Path(text).iterdir() if file.is_file())
         with suppress(ValueError):  # what is no spec is told by the command itself
             if is_spec(text):
                 for file in (file for _, file in files_of(text) if file.is_file()):

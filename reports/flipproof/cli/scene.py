@@ -14,13 +14,19 @@ def add_scene(commands: Any) -> None:
     scene.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     scene.add_argument("--format", choices=["mjcf", "urdf"], default="mjcf", help="(default %(default)s)")
     scene.add_argument("--slices", type=count, default=10, metavar="N", help="slices, alpha/2m unchanged (%(default)s)")
-    scene.add_argument("--out", type=output, required=True, metavar="FOLDER", help="folder to write, made if missing")
+    scene.add_argument("--out", type=output, required=True, metavar="FOLDER", help="folder to write or replace")
 
 
 def command_scene(options: argparse.Namespace) -> int:
     """Write the scene."""
+    from flipproof.output.folder import check_replaceable, replaced_folder
     from flipproof.output.scene import write_scene
 
-    write_scene(read_scenario(options.scenario, options.slices), options.out, options.format)
-    print(f"{options.out}: the scene, scene.json, answers.csv; python {options.out / 'readback.py'} checks an engine")
+    check_replaceable(options.out, "scene")
+    throw = read_scenario(options.scenario, options.slices)
+    with replaced_folder(options.out, "scene") as folder:
+        write_scene(throw, folder, options.format)
+    engine = "pinocchio" if options.format == "urdf" else "mujoco"
+    print(f"{options.out}: the scene, scene.json, answers.csv")
+    print(f"python {options.out / 'readback.py'} {engine}  # holds masses and inertias of an engine against scene.json")
     return 0

@@ -142,7 +142,7 @@ class Column:
     @property
     def worst(self) -> int | None:
         """Row of the largest ratio of the difference to what is admissible; None: no row can be compared."""
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             ratio = np.nan_to_num(self.gap.size / self.allowed, posinf=np.inf)
         ratio[~self.comparable] = -1.0
         return int(ratio.argmax()) if self.comparable.any() else None
@@ -252,6 +252,7 @@ class Comparison:
         }
 
 
+@np.errstate(all="ignore")  # a file may hold numbers as large as there are
 def compare(
     first: Curves,
     second: Curves,

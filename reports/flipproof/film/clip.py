@@ -98,7 +98,9 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     available = [kind for kind, columns in columns_of.items() if set(columns) <= set(names)]
     header_text = f"; it has {shortened(', '.join(names), 80)}"
     if "t" not in names:
-        raise ValueError(f"{path}: the header has no column t{header_text}")
+        raise ValueError(
+            f"{path}: the header has no column t{header_text}; an export of Tracker needs --cap and --base"
+        )
     if not available or (quantity and quantity not in available):
         raise ValueError(f"{path}: the header has no column {quantity or 'theta or omega'}{header_text}")
     chosen = quantity or available[0]

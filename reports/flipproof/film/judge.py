@@ -34,6 +34,9 @@ SCALE_ERROR: Final = 0.03
 EXCHANGED: Final = 20.0
 """Logarithm of a ratio of likelihoods: a film that gains more by exchanging cap and base is refused."""
 
+MIN_FLIGHT: Final = 0.1
+"""Shortest flight of a bottle that is believed [s]: an equation may fit a few frames of whatever turns."""
+
 JUMP: Final = 0.35
 """Jump of both ends between two clicks, fraction of the bottle's length a frame, that no hand makes.
 
@@ -180,6 +183,11 @@ class Assessment:
                 f"{advice}"
             )
         if estimate.likelihood.planar:
+            if (lasts := estimate.likelihood.touch - float(x[0])) < MIN_FLIGHT:
+                raise UnsoundError(
+                    f"{film.label}: the flight found lasts {lasts:.3g} s, from {x[0]:.4g} s on; a flip lasts "
+                    f"{MIN_FLIGHT:g} s at least: give --release and --landing, and see whether it is water that flies"
+                )
             if held.release is None and x[0] < film.t[0] + 2 * float(np.median(np.diff(film.t))):
                 raise UnsoundError(
                     f"{film.label}: the release at {x[0]:.4g} s lies within two frames of the first: click frames "
@@ -206,7 +214,7 @@ class Assessment:
             if self.noise > 0.1 * estimate.best["length"]:
                 raise UnsoundError(
                     f"{film.label}: no flight fits better than {1e3 * self.noise:.2g} mm: are cap and base exchanged, "
-                    "or other things clicked?"
+                    "other things clicked, or is the water frozen?"
                 )
             self._check_origin()
             self._check_release()

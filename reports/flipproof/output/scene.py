@@ -29,12 +29,14 @@ SLICE_INERTIA: Final = 1e-12
 def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> None:
     """Write scene.xml or scene.urdf, scene.json (masses, inertias, release, impacts), answers.csv and readback.py.
 
-    The answers are free flight by ``ode_reference``. Raises ValueError for ice, whose slices have no joints, and
-    OSError if the folder cannot be written.
+    The answers are free flight by ``ode_reference``. Raises ValueError for ice, whose slices have no joints, and for a
+    flight that stops before its end, and OSError if the folder cannot be written.
     """
     if throw.frozen:
         raise ValueError("frozen = true: the slices of a scene move")
     flight, bottle = ode_reference.solve(throw, "free-flight"), throw.bottle
+    if not flight.ok:
+        raise ValueError(f"there are no answers for this throw: {flight.status}: {flight.message}")
     across = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)  # Eq. 11a
     bodies = {"tube": [bottle.mass, across, bottle.mass * bottle.radius**2, across]}
     bodies |= {f"slice_{i}": [throw.slice_mass, *[SLICE_INERTIA] * 3] for i in range(throw.n_slices)}
@@ -53,7 +55,6 @@ def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> None:
         "qvel": qvel,
         "impacts": impacts,
     }
-    folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / scene, _urdf(throw, bodies) if form == "urdf" else _mjcf(throw, bodies, qpos, qvel))
     write_text(folder / "scene.json", json.dumps(json_ready(facts), indent=1) + "\n")
     write_text(folder / "answers.csv", trajectory_csv(flight))

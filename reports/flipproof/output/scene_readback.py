@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 FOLDER = Path(__file__).resolve().parent
+ENGINES = ("mujoco", "pinocchio", "newton", "pybullet")
 
 
 def held(engine: str, scene: str) -> Any:
@@ -45,6 +46,8 @@ def held(engine: str, scene: str) -> Any:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2 or sys.argv[1] not in ENGINES:
+        sys.exit(f"usage: python readback.py {' | '.join(ENGINES)}")
     facts = json.loads((FOLDER / "scene.json").read_text(encoding="utf-8"))
     meant = np.array(list(facts["bodies"].values()))
     actual = held(sys.argv[1], str(FOLDER / facts["scene"]))

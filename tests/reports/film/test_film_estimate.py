@@ -2,13 +2,14 @@
 
 from contextlib import nullcontext
 from dataclasses import replace
+from pathlib import Path
 
 import film_simulator
 import numpy as np
 import pytest
 
 from flipproof.cli.main import main
-from flipproof.film.clip import SCHEMA
+from flipproof.film.clip import SCHEMA, read_film
 from flipproof.film.estimate import NoFlightError, estimate, exchange_gain, exchanged, settle, shortest
 from flipproof.film.fall import hand_share
 from flipproof.film.judge import EXCHANGED, Assessment, UnsoundError, shared_draws
@@ -227,6 +228,16 @@ def test_ice_tells_nothing_of_drag():
     film = replace(film, values=film.values + np.random.default_rng(0).normal(0, 3e-3, film.values.shape))
     judged = Assessment(estimate(film, replace(THROW, frozen=True)))
     assert judged.verdict("gamma") == judged.verdict("restitution") == "cannot tell"
+
+
+@pytest.mark.slow
+def test_water_is_not_fitted_to_a_moment_of_ice():
+    """From its release on ice fits no water; a twentieth of a second of it does."""
+    examples = Path(__file__).parents[3] / "examples"
+    film = read_film([examples / "tracker" / "ice.txt"], cap="cap", base="base", length_unit="m")
+    throw = Scenario.from_toml(examples / "paper_7_filling_0.33.toml")
+    with pytest.raises(UnsoundError, match=r"the flight found lasts 0\.0\d+ s"):
+        Assessment(estimate(film, throw)).check()
 
 
 @pytest.mark.parametrize(
