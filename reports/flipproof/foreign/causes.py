@@ -80,15 +80,21 @@ def _only_field(intervals: Sequence[Interval]) -> str:
 
 def time_cause(intervals: Sequence[Interval]) -> str:
     """Return that the solver is at another time than it says, if theta and the places agree on that."""
-    delays, residuals, shifts = [], [], []
+    delays, agree = [], []
     for i in intervals:
         delay = float((i.expected["theta"] - i.theta[1]) / i.omega[1])
         flies = (i.after == 0) & (i.before == 0)
         delays.append(delay)
-        residuals += ((i.expected["r"] - i.r[1])[flies] - i.expected["v"][flies] * delay).tolist()
-        shifts += (i.expected["v"][flies] * delay).tolist()
-    if not rms(shifts) or rms(residuals) > 0.1 * rms(shifts) or rms(delays) < 1e-7 * intervals[0].throw.duration:
+        shifted = i.expected["v"][flies] * delay
+        if rms(shifted):
+            agree.append(rms((i.expected["r"] - i.r[1])[flies] - shifted) < 0.1 * rms(shifted))
+    if not agree or np.mean(agree) < 0.5 or rms(delays) < 1e-7 * intervals[0].throw.duration:
         return ""
+    if np.median(np.abs(delays)) < 0.3 * rms(delays):
+        return (
+            f"theta and places are together those of another instant, by up to {np.max(np.abs(delays)):.1g} s: look at "
+            "the instants at which a step is read for its answers, above all one that an event cuts short"
+        )
     direction = "earlier" if np.median(delays) > 0 else "later"
     return (
         f"theta and places are those of {rms(delays):.2g} s {direction}: look at the clock, and at the rest of a step"
@@ -116,10 +122,17 @@ def _impact_cause(intervals: Sequence[Interval], *, recoil: bool) -> str:
         struck.append(errors[index])
         others.append(np.delete(errors, index)[np.delete(i.after, index) == 0])
     own_error, other_error = rms(struck), rms(np.concatenate(others))
+    if np.mean([_goes_on(i) for i in single]) > 0.6:
+        return (
+            "the slice that should strike goes on as if it had not: look at how impacts are found in a step, and "
+            "whether the earliest of several comes first"
+        )
     if other_error < 0.05 * own_error:
         return f"{_restitution_cause(single)}, and the others are right"
     if not recoil:
         return "the slice that strikes and the others are off, which no impact of this equation moves"
+    if e := _common_restitution(single):
+        return e
     if own_error < 0.05 * other_error:
         return "the slice that strikes is right, the others are not: look at the recoil of the tube"
     alike = np.array(
@@ -128,6 +141,30 @@ def _impact_cause(intervals: Sequence[Interval], *, recoil: bool) -> str:
     if alike.size and alike.mean() > 0.8:
         return "all slices' speeds are off by the same: look at the recoil of the tube"
     return "the slice that strikes and the others are off: look at the recoil of the tube"
+
+
+def _goes_on(interval: Interval) -> bool:
+    """Return whether the slice that should strike keeps its speed, on its way to the end."""
+    index = interval.hits[0][0]
+    change = interval.expected["v"][index] - interval.v[0][index]
+    return bool(abs(interval.v[1][index] - interval.v[0][index]) < 0.1 * abs(change))
+
+
+def _common_restitution(intervals: Sequence[Interval]) -> str:
+    """Return with what restitution all speeds go, of the slice that strikes and by recoil, if one explains them."""
+    texts: dict[float, list[float]] = {}
+    for i in intervals:
+        free = (i.after == 0) & (i.before == 0)
+        change, errors, e = (i.expected["v"] - i.v[0])[free], (i.v[1] - i.expected["v"])[free], i.throw.restitution
+        factor = float(change @ errors) / max(float(change @ change), 1e-300)
+        if len(change) > 1 and rms(errors - factor * change) < 0.2 * rms(errors):
+            texts.setdefault(e, []).append(e + factor * (1.0 + e))
+    if sum(map(len, texts.values())) < 0.7 * len(intervals):
+        return ""
+    words = [
+        f"{np.median(values):.2g} where it is {e:.3g}" for e, values in sorted(texts.items()) if np.std(values) < 0.1
+    ]
+    return f"slices rebound, and the tube recoils, as if e were {' and '.join(words)}" if words else ""
 
 
 def _restitution_cause(intervals: Sequence[Interval]) -> str:

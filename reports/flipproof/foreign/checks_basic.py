@@ -84,6 +84,10 @@ def check_start(traits: Traits) -> CheckGenerator:
         hint = "theta is off by whole turns: do not wrap it"
     initial = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
     few_digits = _digits_advice(worst, initial[worst][0], float(initial[worst][1][0])) if worst in initial else ""
+    if worst == "omega" and not (errors[worst] <= bound or cached or from_slope):
+        (inside,) = yield [replace(asks[0], start=elsewhere.far_from_ends(THROW))]
+        if abs(inside.omega[0] / THROW.omega0 - 1.0) <= bound:
+            hint = "right from a start far from the ends: look at the places of the ends, h/2 and L - h/2"
     return Observation(
         holds=errors[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
@@ -449,6 +453,14 @@ SLOW: Final = replace(THROW, omega0=THROW.omega0 / 8, duration=8 * THROW.duratio
 """A throw that turns as far as ``THROW`` in eight times the time."""
 
 
+DEFINED: Final = {
+    "r_cm": "r_cm is the centre of mass of bottle and water, from the cap: look at the masses, and at where it begins",
+    "inertia": "J is that about the common centre of mass, with the bottle's own: look at the masses, at the bottle's "
+    "own inertia, and at where the answer is put together",
+}
+"""What is answered beside r, and what to look at."""
+
+
 def check_definitions(traits: Traits) -> CheckGenerator:
     """r_cm and inertia are those of the slices at the same instant; slices leave an impact at e times their speed."""
     ask = ask_of(traits, THROW)
@@ -472,16 +484,18 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     scale = {"r_cm": THROW.bottle.length, "inertia": float(np.max(derived["inertia"]))}
     errors = {name: np.abs(getattr(answer, name) - derived[name]) / scale[name] for name in derived}
     worst = max(errors, key=lambda name: float(errors[name].max()))
+    values = np.asarray(getattr(answer, worst))
+    hint = _decimals_advice(answer) + _delay_advice(values, derived[worst])
+    if worst == "inertia":
+        hint += _parts_advice(answer.r, values)
+    elif np.max(np.abs(values + derived["r_cm"] - scale["r_cm"])) < bound * scale["r_cm"]:
+        hint += "r_cm is L minus the right one: measure it from the cap; "
     return Observation(
         holds=float(errors[worst].max()) <= bound,
         expected=f"within {bound:.1g} of those that follow from r",
         observed=f"{worst} off by {errors[worst].max():.2g}",
         where=time_of_max(answer.t, errors[worst]),
-        advice=_decimals_advice(answer)
-        + _delay_advice(getattr(answer, worst), derived[worst])
-        + (_parts_advice(answer.r, answer.inertia) if worst == "inertia" and answer.inertia is not None else "")
-        + "r_cm is the centre of mass of bottle and water from the cap, J that about it with the bottle's own: "
-        "look at the masses, at the bottle's own inertia, and at where the answer is put together",
+        advice=hint.removesuffix("; ") or DEFINED[worst],
     )
 
 
@@ -509,7 +523,7 @@ def _factor_advice(answer: Answer) -> str:
     if abs(factor - 1.0) < 0.01 or not rms(mean - factor * slope) < 0.02 * rms(mean):
         return ""
     spin, length = abs(SMOOTH.omega0), SMOOTH.bottle.length
-    constants = {"-1": -1.0, "1 / omega_0": 1 / spin, "omega_0": spin, "1 / L": 1 / length, "L": length}
+    constants = {"1 / omega_0": 1 / spin, "omega_0": spin, "1 / L": 1 / length, "L": length}
     name = next((f", {name}," for name, value in constants.items() if abs(factor / value - 1.0) < 0.005), "")
     return f"v is {factor:.4g}{name} times dr/dt throughout: look at its unit and sign; "
 
@@ -528,6 +542,8 @@ def _parts_advice(r: FloatArray, inertia: FloatArray) -> str:
     if np.max(np.abs(columns @ factors - inertia)) > 1e-4 * np.max(inertia):
         return ""
     words = ("the bottle's about its middle", "that of the slices about their mean", "the shift to the common centre")
+    if np.ptp(factors) < 1e-3 < abs(factors[0] - 1.0):
+        return f"J counts {factors[0]:.4g} times as a whole: look at the mass or the length by which it is scaled; "
     wrong = [
         f"{name} counts {f:.3g} times ({meaning})"
         for name, meaning, f in zip(parts, words, factors, strict=True)
@@ -673,14 +689,17 @@ def check_mirror(traits: Traits) -> CheckGenerator:
     if not holds:
         answers = yield [ask for throw in SIMPLER.values() for ask in _mirrored(traits, throw)]
         sizes = [float(_mirror_error(*pair).max()) for pair in zip(answers[::2], answers[1::2], strict=True)]
-        advice = _right_without(sizes, bound)
+        if (mirrored.theta[1] - mirrored.theta[0]) * mirrored.omega[0] < 0.0:
+            advice = "with omega below 0 theta grows: look at the sign of omega where theta is advanced"
+        else:
+            advice = _right_without(sizes, bound) + "look for abs(omega), a sign of theta, another angle than theta in "
+            advice += "the weight, or a place that assumes omega > 0"
     return Observation(
         holds=holds,
         expected=f"omega -> -omega within {bound:.1g} of omega_0",
         observed=f"off by {change.max():.2g}",
         where=time_of_max(original.t, change),
-        advice=f"{advice}look for abs(omega), a sign of theta, another angle than theta in the weight, or a place that "
-        "assumes omega > 0",
+        advice=advice,
     )
 
 

@@ -195,7 +195,10 @@ def check_order_before(traits: Traits) -> CheckGenerator:
                 "answer between two steps at the order of the steps"
             )
     else:
-        for name, throw in CALM.items():
+        end_orders = _orders(traits, (yield from _changes_before(traits, SMOOTH, levels, end_alone=True)))
+        if end_orders and min(end_orders.values()) >= required:
+            advice = "of that order where the end alone is asked: look at how an answer between two steps is made"
+        for name, throw in CALM.items() if not advice else ():
             orders_without = _orders(traits, (yield from _changes_before(traits, throw, levels)))
             if orders_without and min(orders_without.values()) >= required:
                 advice = f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}"
@@ -221,14 +224,18 @@ def check_order_before(traits: Traits) -> CheckGenerator:
 
 
 def _changes_before(
-    traits: Traits, throw: Scenario, levels: Sequence[int], *, uneven: bool = False
+    traits: Traits, throw: Scenario, levels: Sequence[int], *, uneven: bool = False, end_alone: bool = False
 ) -> Generator[Sequence[Ask], Sequence[Answer], dict[str, list[float]]]:
     """Return by field how much it changes from level to level, a fraction of its largest value.
 
-    Answers are compared at three times; with ``uneven`` others are asked, too, 0.4 and 0.8 of a step apart.
+    Answers are compared at three times, or at the ``end_alone``; with ``uneven`` others are asked, too, 0.4 and 0.8 of
+    a step apart.
     """
     common = throw.duration * (np.array([0.37, 0.71, 1.0]) if uneven else np.array([0.0, 0.5, 1.0]))
     asks = [ask_of(traits, throw, level, points=3) for level in levels]
+    if end_alone:
+        common = common[-1:]
+        asks = [replace(ask, times=common) for ask in asks]
     if uneven:
         asks = [
             replace(ask, times=np.union1d(common, _uneven_times(throw.duration, 960.0 / 1.2 * 2.0**level)))

@@ -178,7 +178,7 @@ def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureG
     where, advice = _describe(equation, intervals, departs)
     if ignored and not advice:
         advice = f"another {traits.refined_by} changes nothing: look at how ask.effort is used"
-    return where, advice
+    return where, advice or "no term explains it: look at iterations that end early, and at tolerances of its own"
 
 
 def _intervals_at(
@@ -342,6 +342,8 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
         cause = ""  # other impacts recoil rightly
     if "look at" in cause or (cause and look_at in ("weight", "drag", "odd")):  # the terms are named
         look_at = ""
+    if look_at in ("weight", "drag") and outside and 5 * (total - common) * count > common * (len(intervals) - count):
+        look_at = ""  # it happens without it, too
     advice = f"look at {LOOK_AT[look_at]}" if look_at else ""
     return where, "; ".join(part for part in (cause, advice) if part)
 

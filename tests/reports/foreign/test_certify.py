@@ -702,6 +702,14 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("dopri_dense_output_slope", "velocity", "look at how r and v are answered between two steps"),
         ("printed_fixed_decimals", "digits", "6 decimals of every number"),
         ("lists_gravity_of_earth", "piecewise", "as if g were 9.81 m/s^2 where it is 0"),
+        ("picard_first_found_hit", "piecewise", "goes on as if it had not: look at how impacts are found in a step"),
+        ("picard_output_in_cut_pieces", "piecewise", "above all one that an event cuts short"),
+        ("picard_iteration_stops_early", "piecewise", "look at iterations that end early"),
+        ("splitter_whole_slice_from_the_end", "start", "right from a start far from the ends: look at the places"),
+        ("gauss_turns_only_forward", "mirror", "look at the sign of omega where theta is advanced"),
+        ("gauss_centre_from_the_base", "definitions", "measure it from the cap"),
+        ("gauss_inertia_in_units_of_water", "definitions", "J counts 0.947 times as a whole"),
+        ("gauss_output_on_the_chord", "order-before-impacts", "look at how an answer between two steps is made"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
@@ -720,6 +728,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
                 ("printed_loses_rest_of_step", "piecewise", "look at the clock, and at the rest of a step"),
                 ("series_cosine_chain", "elsewhere", "look at what goes on within a long step"),
                 ("angle_rk4_impact_at_an_angle", "elsewhere", "impacts not: look at how the answer is put together"),
+                ("extrapolator_no_restitution_is_a_half", "elsewhere", "and the tube recoils, as if e were 0.49 where"),
                 ("angle_rk4_about_middle", "equation", "look at the centrifugal term omega^2 (r - r_cm)"),
             )
         ),
