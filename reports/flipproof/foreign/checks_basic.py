@@ -85,8 +85,8 @@ def check_start(traits: Traits) -> CheckGenerator:
     initial = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
     few_digits = _digits_advice(worst, initial[worst][0], float(initial[worst][1][0])) if worst in initial else ""
     if worst == "omega" and not (errors[worst] <= bound or cached or from_slope):
-        (inside,) = yield [replace(asks[0], start=elsewhere.far_from_ends(THROW))]
-        if abs(inside.omega[0] / THROW.omega0 - 1.0) <= bound:
+        (inside,) = yield [replace(ask, start=elsewhere.far_from_ends(throw))]
+        if abs(inside.omega[0] / throw.omega0 - 1.0) <= bound:
             hint = "right from a start far from the ends: look at the places of the ends, h/2 and L - h/2"
     return Observation(
         holds=errors[worst] <= bound,
