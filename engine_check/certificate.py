@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from engine_check.engines import ENGINES, checked_number
+from engine_check.engines import ENGINES, check_asked, checked_number
 from engine_check.refinement import BENT, DOUBLE, EARLIER, MOVED, SHAKEN, Level, Runs, Trial, search
 from engine_check.restitution import Rebound, measure_restitution
 from slicemodel.scenario import Scenario, not_whole
@@ -211,6 +211,7 @@ def certify(
     ``python benchmarks/engine_bands.py``) all lie within their band at the end and 63 at 95 % of the output times or
     more, against event-driven free flight; of all output times 99.3 %.
     """
+    check_asked(scenario, engine, ice, slices)
     tolerance = checked_number("tolerance", tolerance, 0.0, 1.0)
     problem = not_whole("levels", levels, 1, MAX_LEVELS)
     if problem:

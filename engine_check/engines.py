@@ -12,7 +12,7 @@ from typing import Final
 
 from numpy.typing import ArrayLike
 
-from slicemodel.scenario import Scenario, unknown_name
+from slicemodel.scenario import Scenario, known_name, refuse_other, unknown_name
 from slicemodel.trajectory import FloatArray, Trajectory, output_times
 
 
@@ -118,9 +118,8 @@ class SetupError(RuntimeError):
 
 def check_asked(scenario: Scenario, engine: str, ice: str, slices: str) -> None:
     """Raise ValueError if no such engine, ice model or contact is known, or this engine cannot throw this scenario."""
-    if engine not in ENGINES:
-        raise ValueError(unknown_name("engine =", engine, ENGINES))
-    has = ENGINES[engine]
+    refuse_other("scenario", scenario, Scenario)
+    has = ENGINES[known_name("engine", engine, ENGINES)]
     choices = (
         ("ice", ice, ICE_MODELS, ICE_MODELS),
         ("slices", slices, CONTACTS, has.contacts),

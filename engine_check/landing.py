@@ -36,7 +36,7 @@ from engine_check.mujoco_world import TUBE, TUBE_DOFS
 from engine_check.mujoco_world import build as release
 from engine_check.readback import differences, matched
 from slicemodel.compiled import compiled, kept_on_disk
-from slicemodel.scenario import Scenario, unknown_name
+from slicemodel.scenario import Scenario, known_name, refuse_other
 from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch
 from slicemodel.trajectory import FloatArray
 
@@ -125,11 +125,10 @@ def land(
     SetupError
         If the engine did not receive what was meant.
     """
-    if engine not in LANDERS:
-        raise ValueError(unknown_name("engine =", engine, LANDERS))
-    chosen = "together" if law is None else law
-    if chosen not in LAWS:
-        raise ValueError(unknown_name("law =", chosen, LAWS))
+    refuse_other("touch", touch, Touch)
+    refuse_other("table", table, Table)
+    known_name("engine", engine, LANDERS)
+    chosen = known_name("law", "together" if law is None else law, LAWS)
     if touch.scenario.frozen and law is not None:
         raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
     default = ICE_STEP if immovable(touch.scenario) else STEP

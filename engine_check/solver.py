@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from engine_check.certificate import DEFAULT_TOLERANCE, certified
-from engine_check.engines import check_asked, run_engine
+from engine_check.engines import run_engine
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import Trajectory
 
@@ -73,6 +73,5 @@ def solve(
     """
     if dt is not None or iterations is not None:
         return run_engine(scenario, engine, dt, iterations, times, ice=ice, slices=slices, **knobs)
-    check_asked(scenario, engine, ice, slices)
     settings = {"times": times, "tolerance": tolerance, "ice": ice, "slices": slices}
     return certified(scenario, engine, **settings, **knobs)

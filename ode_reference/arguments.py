@@ -4,20 +4,12 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Collection
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from slicemodel.scenario import Scenario, unknown_name
+from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray
-
-
-def known_name(argument: str, name: object, choices: Collection[str]) -> str:
-    """Return ``name`` if it is a key of ``choices``, else raise ValueError with the nearest key."""
-    if isinstance(name, str) and name in choices:
-        return name
-    raise ValueError(unknown_name(f"{argument} =", name, choices))
 
 
 def true_or_false(name: str, value: object) -> bool:

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import known_name, number_within, true_or_false, velocities_of
+from ode_reference.arguments import number_within, true_or_false, velocities_of
 from ode_reference.combinations import is_ours, model_of, require_own_switches
 from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import Switches, are_switches
-from slicemodel.scenario import Scenario, not_whole
+from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other
 from slicemodel.trajectory import Trajectory, check_states, output_times, times_given
 
 if TYPE_CHECKING:
@@ -173,8 +173,7 @@ def solve(
     and by more than omega_0 before 5 s, with status "ok". "Radau" has a dense output of order 3 only: at rtol above
     1e-8 its rebounds need max_step = 0.02 / |omega0|.
     """
-    if not isinstance(scenario, Scenario):
-        raise ValueError(f"scenario = {scenario!r} is not a slicemodel.Scenario")
+    refuse_other("scenario", scenario, Scenario)
     energy = true_or_false("energy", energy)
     if true_or_false("own_inertia", own_inertia):
         run = solve(
@@ -267,8 +266,7 @@ def solve_batch(
     if jobs is not None and (problem := not_whole("jobs", jobs, 1, 1024)):
         raise ValueError(problem)
     for k, throw in enumerate(throws):
-        if not isinstance(throw, Scenario):
-            raise ValueError(f"throws[{k}] = {throw!r} is not a slicemodel.Scenario")
+        refuse_other(f"throws[{k}]", throw, Scenario)
     chosen = model_named(model)
     for throw in throws:
         require_own_switches(chosen, throw)

@@ -29,14 +29,14 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
 from ode_reference import messages
-from ode_reference.arguments import known_name, number_above, number_within
+from ode_reference.arguments import number_above, number_within
 from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
 from ode_reference.energy import Ledger, nodes
 from ode_reference.impacts import LAWS, immovable
 from ode_reference.motion import Model, Motion, Throw
 from ode_reference.twins import twin_of
 from slicemodel.observables import grazes, opposite_hits
-from slicemodel.scenario import Scenario
+from slicemodel.scenario import Scenario, known_name
 from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory
 
 METHODS: Final = {

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slicemodel.scenario import Scenario, not_whole, shortened
+from slicemodel.scenario import Scenario, not_whole, refuse_other
 from slicemodel.schemes import Scheme, StepForm
 from slicemodel.solver import Rebound, advance, checked, grid, trajectory
 from slicemodel.trajectory import STATES_LIMIT, FloatArray, Trajectory
@@ -113,7 +113,7 @@ def solve_batch(
     ValueError
         As in ``solve``; no scenarios, jobs out of range, or results of more than 4 GiB.
     TypeError
-        Something among the scenarios is not a Scenario.
+        One Scenario instead of a sequence.
 
     Accuracy
     --------
@@ -158,8 +158,7 @@ def _throws(scenarios: Sequence[Scenario]) -> tuple[Scenario, ...]:
     if not throws:
         raise ValueError("scenarios is empty; at least one Scenario is needed")
     for i, throw in enumerate(throws):
-        if not isinstance(throw, Scenario):
-            raise TypeError(f"scenarios[{i}] = {shortened(repr(throw), 60)} is not a Scenario")
+        refuse_other(f"scenarios[{i}]", throw, Scenario)
     return throws
 
 

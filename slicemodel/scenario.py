@@ -36,7 +36,7 @@ import math
 import numbers
 import textwrap
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from difflib import get_close_matches
 from os import PathLike
@@ -462,6 +462,19 @@ def unknown_name(label: str, given: object, choices: Iterable[str]) -> str:
         f"did you mean {by_lower_case[nearest[0]]!r}?" if nearest else f"known: {', '.join(by_lower_case.values())}"
     )
     return f"{label} {shown(given)} is unknown; {advice}"
+
+
+def known_name(argument: str, name: object, choices: Collection[str]) -> str:
+    """Return ``name`` if it is a key of ``choices``, else raise ValueError with the nearest key."""
+    if isinstance(name, str) and name in choices:
+        return name
+    raise ValueError(unknown_name(f"{argument} =", name, choices))
+
+
+def refuse_other(argument: str, value: object, noun: type) -> None:
+    """Raise ValueError if ``value`` is not a ``noun`` of this package."""
+    if not isinstance(value, noun):
+        raise ValueError(f"{argument} = {shown(value)} is not a slicemodel.{noun.__name__}")
 
 
 def _refuse_unknown(given: Iterable[str], allowed: Iterable[str], label: str) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from slicemodel.scenario import Scenario, not_whole, unknown_name
+from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other, unknown_name
 from slicemodel.schemes import SCHEMES, Scheme, StepConstants, StepForm
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory, check_states
 
@@ -67,7 +67,8 @@ def solve(
     Raises
     ------
     ValueError
-        Unknown scheme, store or rebound, "in-step" for a scheme without exact roots, or fewer than 2 steps.
+        No Scenario, unknown scheme, store or rebound, "in-step" for a scheme without exact roots, fewer than 2 steps,
+        or ``lagged`` that is neither true nor false.
 
     Accuracy
     --------
@@ -76,8 +77,11 @@ def solve(
     before the first impact and, with rebounds in the step and no drag, across impacts too. With drag it is of order 1
     there, with a far smaller constant: an impact makes r'_CM jump, and the drag of a step knows one mean of it.
     """
+    refuse_other("scenario", scenario, Scenario)
     chosen, form, steps = checked(scheme, steps, rebound)
     if lagged is not None:
+        if not isinstance(lagged, (bool, np.bool_)):
+            raise ValueError(f"lagged = {lagged!r} is not True or False")
         form = form._replace(lagged=bool(lagged))
     if store not in get_args(Store):
         raise ValueError(unknown_name("store =", store, get_args(Store)))
@@ -108,14 +112,12 @@ def grid(duration: float, steps: int) -> FloatArray:
 
 def checked(scheme: str, steps: int, rebound: Rebound | None) -> tuple[Scheme, StepForm, int]:
     """Return the scheme, its form with ``rebound`` and the points of the grid, or raise ValueError (see ``solve``)."""
-    if scheme not in SCHEMES:
-        raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
+    chosen = SCHEMES[known_name("scheme", scheme, SCHEMES)]
     problem = not_whole("steps", steps, 2, MAX_STEPS)
     if problem:
         raise ValueError(f"{problem} (points of the grid)")
     if rebound is not None and rebound not in get_args(Rebound):
         raise ValueError(unknown_name("rebound =", rebound, get_args(Rebound)))
-    chosen = SCHEMES[scheme]
     if rebound == "in-step" and not chosen.form.exact_roots:
         able = ", ".join(name for name, candidate in SCHEMES.items() if candidate.form.exact_roots)
         raise ValueError(f"rebound = 'in-step' needs a scheme with exact roots ({able}), not {scheme!r}")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from slicemodel.scenario import Scenario, unknown_name
+from slicemodel.scenario import Scenario, known_name
 from slicemodel.schemes import SCHEMES
 from slicemodel.solver import Rebound, solve
 from slicemodel.trajectory import FloatArray
@@ -64,8 +64,7 @@ def required_steps(
     # Written as "not inside", because NaN passes every "outside" test.
     if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not 0.0 < tolerance < 1.0:
         raise ValueError(f"tolerance = {tolerance!r} is outside (0, 1) (a fraction of omega_0)")
-    if scheme not in SCHEMES:
-        raise ValueError(unknown_name("scheme =", scheme, SCHEMES))
+    known_name("scheme", scheme, SCHEMES)
     octave = 1
     good: int | None = None
     while octave * BASE <= MAX_STEPS:

@@ -10,7 +10,7 @@ import numpy as np
 from ode_reference.arguments import number_above, number_within
 from ode_reference.landing.land import state_of, world_of
 from ode_reference.landing.layout import TOUCHED, World
-from slicemodel.scenario import Scenario
+from slicemodel.scenario import Scenario, refuse_other
 from slicemodel.table import Table, Touch
 from slicemodel.trajectory import FloatArray
 
@@ -51,6 +51,8 @@ def fly(scenario: Scenario, table: Table, *, dt: float = FLIGHT_DT) -> Touch:
     --------
     As ``land``: order 2 in ``dt`` between impacts, which are located.
     """
+    refuse_other("scenario", scenario, Scenario)
+    refuse_other("table", table, Table)
     dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
     state, world = _released(scenario, table)
     begin = 0.0
@@ -88,6 +90,7 @@ def turn(scenario: Scenario, every: float) -> tuple[FloatArray, FloatArray, Floa
     scenario : Scenario - the flight lasts for its duration
     every : float - time between two instants [s], which are at most ``FLIGHT_DT`` late
     """
+    refuse_other("scenario", scenario, Scenario)
     every = number_above("every", every, 0.0, scenario.duration)
     (q, s, w), world = _released(scenario, Table(height=FAR))
     record = np.full((math.ceil(scenario.duration / every) + 1, 7 + 2 * world.n), np.nan)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ode_reference.arguments import known_name, number_within
-from slicemodel.scenario import Scenario
+from ode_reference.arguments import number_within
+from slicemodel.scenario import Scenario, known_name, refuse_other
 from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch
 from slicemodel.trajectory import FloatArray
 
@@ -84,6 +84,8 @@ def land(
     rests on at the end of a step. The edge between two outcomes lies within a share of 5 ``dt`` / s in omega of where
     the limit of small steps has it (12 edges of water, steps of 5e-5 to 4e-4 s), for ice of 2e-3 ``dt`` / s.
     """
+    refuse_other("touch", touch, Touch)
+    refuse_other("table", table, Table)
     chosen = _law(touch.scenario, law)
     dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
     world = world_of(touch, table, chosen)

@@ -22,6 +22,8 @@ EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        ({"scenario": None}, r"scenario = None is not a slicemodel\.Scenario"),
+        ({"engine": ["x"]}, r"engine = \['x'\] is unknown; known: pymunk"),
         ({"engine": "pymonk"}, r"engine = 'pymonk' is unknown; did you mean 'pymunk'\?"),
         ({"engine": "xyz"}, "known: pymunk"),
         ({"slices": "exclud"}, r"slices = 'exclud' is unknown; did you mean 'exclude'\?"),
@@ -56,7 +58,7 @@ EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
 )
 def test_an_argument_is_refused_by_name_value_and_range(arguments, words):
     with pytest.raises(ValueError, match=words):
-        solve(THROW, **arguments)
+        solve(**{"scenario": THROW} | arguments)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +70,8 @@ def test_an_argument_is_refused_by_name_value_and_range(arguments, words):
 )
 def test_an_argument_of_a_certificate_is_refused_by_name_and_range(arguments, words):
     with pytest.raises(ValueError, match=words):
-        certify(THROW, **arguments)
+        ({"scenario": None}, r"scenario = None is not a slicemodel\.Scenario"),
+        certify(**{"scenario": THROW} | arguments)
 
 
 @pytest.mark.parametrize(

@@ -314,6 +314,16 @@ def test_bad_arguments_are_refused_by_name_and_range(land, start, arguments, wor
         land(start, Table(height=0.0), **arguments)
 
 
+@PROGRAMS
+def test_what_is_no_touch_or_table_or_law_is_refused_by_name(land):
+    with pytest.raises(ValueError, match=r"touch = None is not a slicemodel\.Touch"):
+        land(None, None)
+    with pytest.raises(ValueError, match=r"table = None is not a slicemodel\.Table"):
+        land(at_rest(WATER), None)
+    with pytest.raises(ValueError, match=r"law = \['together'\] is unknown"):
+        land(at_rest(WATER), Table(height=0.0), law=["together"])
+
+
 def test_an_unknown_engine_is_refused():
     with pytest.raises(ValueError, match="engine = 'bullet' is unknown"):
         engine_check.land(at_rest(WATER), Table(height=0.0), "bullet")

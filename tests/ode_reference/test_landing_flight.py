@@ -100,6 +100,15 @@ def test_a_table_beside_the_thrower_is_reached_from_above_or_refused():
         ode_reference.fly(replace(ice, launch_velocity=(0.5, -1.0)), Table(height=0.07))
 
 
+def test_what_is_no_throw_or_table_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"scenario = None is not a slicemodel\.Scenario"):
+        ode_reference.fly(None, None)
+    with pytest.raises(ValueError, match=r"table = None is not a slicemodel\.Table"):
+        ode_reference.fly(WATER, None)
+    with pytest.raises(ValueError, match=r"scenario = None is not a slicemodel\.Scenario"):
+        ode_reference.turn(None, 0.1)
+
+
 @pytest.mark.parametrize("every", [0.0, -1.0, math.nan, 3.0])
 def test_a_spacing_out_of_range_is_refused(every):
     with pytest.raises(ValueError, match="every = "):

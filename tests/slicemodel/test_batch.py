@@ -76,8 +76,8 @@ def test_any_iterable_of_scenarios_will_do():
     [
         ([], {}, ValueError, ["scenarios is empty"]),
         (Scenario(), {}, TypeError, ["one Scenario", "list"]),
-        ([Scenario(), Bottle()], {}, TypeError, ["scenarios[1] = Bottle(", "is not a Scenario"]),
-        ([Scenario(), None], {}, TypeError, ["scenarios[1] = None"]),
+        ([Scenario(), Bottle()], {}, ValueError, ["scenarios[1] = Bottle(", "is not a slicemodel.Scenario"]),
+        ([Scenario(), None], {}, ValueError, ["scenarios[1] = None"]),
         ([Scenario()], {"scheme": "exact"}, ValueError, ["scheme = 'exact'", "did you mean"]),
         ([Scenario()], {"steps": 1}, ValueError, ["steps = 1", "[2, "]),
         ([Scenario()], {"rebound": "never"}, ValueError, ["rebound = 'never'"]),

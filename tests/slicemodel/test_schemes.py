@@ -175,6 +175,9 @@ def test_the_other_spin_is_the_mirror_image():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        ({"scenario": None}, ["scenario = None is not a slicemodel.Scenario"]),
+        ({"scheme": ["midpoint"]}, ["scheme = ['midpoint'] is unknown", "did you mean 'midpoint'?"]),
+        ({"lagged": "a"}, ["lagged = 'a' is not True or False"]),
         ({"scheme": "exact-stepp"}, ["scheme = 'exact-stepp'", "did you mean 'exact-step'?"]),
         ({"scheme": "zzz"}, ["scheme = 'zzz'", "known: published-python"]),
         ({"steps": 1}, ["steps = 1", "[2, 1000000000]"]),
@@ -185,7 +188,7 @@ def test_the_other_spin_is_the_mirror_image():
 )
 def test_bad_arguments_are_named(arguments, words):
     with pytest.raises(ValueError) as refusal:  # noqa: PT011 - the words are checked below
-        slicemodel.solve(SMALL, **arguments)
+        slicemodel.solve(**{"scenario": SMALL} | arguments)
     for word in words:
         assert word in str(refusal.value)
 

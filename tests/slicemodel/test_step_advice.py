@@ -17,6 +17,7 @@ SMALL = Scenario().with_slices(5)
             for tolerance in (0.0, -1e-3, 1.0, math.nan, math.inf, "small", True)
         ),
         ((1e-3, "midpont"), "did you mean 'midpoint'"),
+        ((1e-3, ["midpoint"]), r"scheme = \['midpoint'\] is unknown"),
         # Its slices escape.
         ((1e-3, "published-matlab"), "published-matlab has no step size to ask for on this throw: "),
     ],
@@ -24,6 +25,11 @@ SMALL = Scenario().with_slices(5)
 def test_what_has_no_answer_is_refused_by_name(arguments, words):
     with pytest.raises(ValueError, match=words):
         required_steps(SMALL, *arguments)
+
+
+def test_what_is_no_throw_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"scenario = None is not a slicemodel\.Scenario"):
+        required_steps(None, 0.1)
 
 
 def test_a_tolerance_out_of_reach_is_said_so(monkeypatch):
