@@ -43,6 +43,7 @@ There is no text file between us and the engine (``MjSpec``), so that every numb
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Final
@@ -77,7 +78,7 @@ class MujocoKnobs:
 
     def __post_init__(self) -> None:
         # Written as "not inside", because NaN passes every "outside" test.
-        if not 0.0 < self.rest_flight <= MAX_FLIGHT:
+        if not isinstance(self.rest_flight, numbers.Real) or not 0.0 < self.rest_flight <= MAX_FLIGHT:
             raise ValueError(f"rest_flight = {self.rest_flight!r} is outside (0, {MAX_FLIGHT:g}]")
 
     @classmethod

@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Final
 
 from engine_check.engines import MAX_ITERATIONS
-from slicemodel.scenario import Scenario, unknown_name
+from slicemodel.scenario import MAX_VALUE, Scenario, _Checks, unknown_name
 
 CAP_ELASTICITY: Final = 1.0
 """The engine multiplies the elasticities of the two partners [1] (default 0): slices carry e, so caps carry 1."""
@@ -144,14 +144,11 @@ class PymunkKnobs:
     grid_offset: float = 0.0
 
     def __post_init__(self) -> None:
-        problems = [
-            f"{name} = {getattr(self, name)!r} is outside {_range_words(*_RANGES[name])}"
-            for name in _RANGES
-            if not (getattr(self, name) is None and name in _MAY_BE_LEFT_OUT)
-            and not _RANGES[name][0] <= getattr(self, name) <= _RANGES[name][1]
-        ]
-        if problems:
-            raise ValueError("; ".join(problems))
+        checks = _Checks()
+        for name, (minimum, maximum) in _RANGES.items():
+            if not (getattr(self, name) is None and name in _MAY_BE_LEFT_OUT):
+                checks.number(name, getattr(self, name), "", minimum=minimum, maximum=maximum)
+        checks.refuse()
 
     @classmethod
     def from_overrides(cls, overrides: Mapping[str, float]) -> PymunkKnobs:
@@ -167,20 +164,16 @@ class PymunkKnobs:
         return asdict(self)
 
 
-def _range_words(low: float, high: float) -> str:
-    return f"[{low:g}, inf)" if math.isinf(high) else f"[{low:g}, {high:g}]"
-
-
 _RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "collision_bias": (0.0, 1.0),
-    "collision_slop": (0.0, math.inf),
+    "collision_slop": (0.0, MAX_VALUE),
     "collision_persistence": (1, 1_000_000),
     "error_bias": (0.0, 1.0),
     "damping": (0.0, 1.0),
-    "friction": (0.0, math.inf),
-    "cap_thickness": (0.0, math.inf),
-    "groove_reach": (0.0, math.inf),
-    "anchor_distance": (0.0, math.inf),
+    "friction": (0.0, MAX_VALUE),
+    "cap_thickness": (0.0, MAX_VALUE),
+    "groove_reach": (0.0, MAX_VALUE),
+    "anchor_distance": (0.0, MAX_VALUE),
     "slice_restitution": (0.0, 1.0),
     "shuffle": (0, 1_000_000),
     "grid_offset": (0.0, 0.5),

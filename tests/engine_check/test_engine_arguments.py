@@ -44,6 +44,7 @@ EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
         ({"error_bias": math.nan}, r"error_bias = .* is outside \[0"),
         ({"damping": 2.0}, r"damping = .* is outside \[0"),
         ({"cap_thickness": math.nan}, "cap_thickness = nan is outside"),
+        *(({knob: "a"}, rf"{knob} = 'a' is not a number \(admissible: \[0, ") for knob in ("friction", "damping")),
         ({"slice_restitution": 0.3}, r"slice_restitution = 0\.3 has no effect where slices = 'overlap'"),
         *(
             (EXCLUDE | {"slice_restitution": wrong}, r"slice_restitution = .* is outside \[0, 1\]")
@@ -51,7 +52,10 @@ EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
         ),
         (MUJOCO | {"rest_fligth": 1.0}, r"knob = 'rest_fligth' is unknown; did you mean 'rest_flight'\?"),
         (MUJOCO | {"rest_flight": 0.0}, r"rest_flight = 0.0 is outside \(0, 1000\]"),
-        (MUJOCO | {"rest_flight": math.nan}, r"rest_flight = nan is outside"),
+        *(
+            (MUJOCO | {"rest_flight": wrong}, rf"rest_flight = {wrong!r} is outside \(0, 1000\]")
+            for wrong in (math.nan, "a")
+        ),
         (MUJOCO | {"iterations": 100}, "iterations = 100 has no meaning for engine = 'mujoco'"),
         (MUJOCO | {"slices": "exclude"}, "has no slices = 'exclude'"),
     ],
