@@ -85,6 +85,9 @@ CONTACTS: Final = ("overlap", "exclude")
 """What two slices do when they meet: pass through each other as in the paper, or collide as rods of length h/N."""
 
 MAX_ITERATIONS: Final = 1_000_000
+MAX_STEPS: Final = 1_000_000_000
+"""Steps of a run at the most, as of the slice model."""
+
 MAX_DRIFT: Final = 5e3
 """Largest launch velocity of an engine's throw [|omega0| L]."""
 
@@ -156,10 +159,11 @@ def run_engine(
     """
     check_asked(scenario, engine, ice, slices)
     run = import_module(ENGINES[engine].module).run
+    t_out = output_times(scenario, times)
     order = Order(
-        dt=checked_number("dt", DEFAULT_DT if dt is None else dt, 0.0, math.inf, " s"),
+        dt=checked_number("dt", DEFAULT_DT if dt is None else dt, float(t_out[-1]) / MAX_STEPS, math.inf, " s"),
         iterations=_checked_iterations(iterations),
-        times=output_times(scenario, times),
+        times=t_out,
         ice=ice,
         slices=slices,
         knobs=knobs,

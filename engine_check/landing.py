@@ -29,7 +29,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_check.engines import checked_number
+from engine_check.engines import MAX_STEPS, checked_number
 from engine_check.mujoco_log import no_log
 from engine_check.mujoco_setup import verify
 from engine_check.mujoco_world import TUBE, TUBE_DOFS
@@ -104,8 +104,8 @@ def land(
     engine : str
         A name in ``LANDERS``.
     dt : float, optional
-        Step [s], in (0, 1e-3]; ``STEP`` for water or ``ICE_STEP`` for ice otherwise. Where half of it ends otherwise,
-        or gives energy, the step is halved again, ``HALVINGS`` times in all.
+        Step [s], in (5e-9, 1e-3]; ``STEP`` for water or ``ICE_STEP`` for ice otherwise. Where half of it ends
+        otherwise, or gives energy, the step is halved again, ``HALVINGS`` times in all.
     law : str, optional
         A name in ``slicemodel.table.LAWS``; "together" by default. Ice has none.
 
@@ -132,7 +132,7 @@ def land(
     if touch.scenario.frozen and law is not None:
         raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
     default = ICE_STEP if immovable(touch.scenario) else STEP
-    step = default if dt is None else checked_number("dt", dt, 0.0, 1e-3 * (1 + 1e-12), " s")
+    step = default if dt is None else checked_number("dt", dt, LONGEST_LANDING / MAX_STEPS, 1e-3 * (1 + 1e-12), " s")
 
     def run(touch: Touch, step: float, gap: float = CLOSED) -> Run:
         with no_log():

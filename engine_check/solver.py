@@ -30,8 +30,9 @@ def solve(
     engine : str
         A name in ``ENGINES``.
     dt : float or None
-        Upper bound of the engine's step [s]; every output interval is divided into equal steps. None: without
-        iterations either, both are those of a certificate (``certify``), which costs several runs; else 1e-4 s.
+        Upper bound of the engine's step [s], above 1e-9 of the last output time; every output interval is divided into
+        equal steps. None: without iterations either, both are those of a certificate (``certify``), which costs several
+        runs; else 1e-4 s.
     iterations : int or None
         Iterations of the engine's impulse solver per step. None: enough for this number of slices and
         this mass ratio (``pymunk_settings.enough_iterations``); ``settings`` states the number.

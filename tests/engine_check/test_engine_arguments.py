@@ -28,12 +28,13 @@ EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
         ({"engine": "xyz"}, "known: pymunk"),
         ({"slices": "exclud"}, r"slices = 'exclud' is unknown; did you mean 'exclude'\?"),
         ({"ice": "weld"}, r"ice = 'weld' is unknown; did you mean 'welded'\?"),
-        *(({"dt": dt}, r"dt = .* s is outside \(0, inf\) s") for dt in (0.0, -1e-4, math.nan, math.inf)),
+        *(({"dt": dt}, r"dt = .* s is outside \(1e-11, inf\) s") for dt in (0.0, -1e-4, math.nan, math.inf, 1e-12)),
         *(({"dt": dt}, r"dt = .* is not a number") for dt in ("1e-4", True)),
         *(
             ({"iterations": iterations}, r"iterations = .* is not a whole number in \[1, 1000000\]")
             for iterations in (0, -1, 1.5, math.nan, True, "10", 10**7)
         ),
+        ({"dt": 1e-12, "times": [0.005]}, r"dt = 1e-12 s is outside \(5e-12, inf\) s"),
         ({"times": [0.0, 0.02]}, "outside"),
         ({"times": [0.005, 0.005]}, "increase"),
         ({"times": []}, "non-empty"),
@@ -43,8 +44,8 @@ EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
         ({"collision_slop": -1.0}, r"collision_slop = .* is outside \[0"),
         ({"error_bias": math.nan}, r"error_bias = .* is outside \[0"),
         ({"damping": 2.0}, r"damping = .* is outside \[0"),
-        ({"cap_thickness": math.nan}, "cap_thickness = nan is outside"),
         *(({knob: "a"}, rf"{knob} = 'a' is not a number \(admissible: \[0, ") for knob in ("friction", "damping")),
+        ({"cap_thickness": math.nan}, "cap_thickness = nan is outside"),
         ({"slice_restitution": 0.3}, r"slice_restitution = 0\.3 has no effect where slices = 'overlap'"),
         *(
             (EXCLUDE | {"slice_restitution": wrong}, r"slice_restitution = .* is outside \[0, 1\]")
@@ -69,12 +70,12 @@ def test_an_argument_is_refused_by_name_value_and_range(arguments, words):
     ("arguments", "words"),
     [
         *(({"tolerance": wrong}, r"tolerance = .* \(0, 1\)") for wrong in (0.0, 1.0, -1e-3, math.nan, "1e-3", True)),
+        ({"scenario": None}, r"scenario = None is not a slicemodel\.Scenario"),
         *(({"levels": wrong}, r"levels = .* is not a whole number in \[1, 20\]") for wrong in (0, 21, 1.5)),
     ],
 )
 def test_an_argument_of_a_certificate_is_refused_by_name_and_range(arguments, words):
     with pytest.raises(ValueError, match=words):
-        ({"scenario": None}, r"scenario = None is not a slicemodel\.Scenario"),
         certify(**{"scenario": THROW} | arguments)
 
 
