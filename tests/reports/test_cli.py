@@ -89,7 +89,14 @@ def test_models_lists_everything_with_reasons(capsys):
         (["report", "--out", "{full}"], ["holds mine.txt and not flipproof's own marker"]),
         (["simulate", "--solver", "eq9"], ["solver 'eq9' is unknown", "did you mean 'eq8'?"]),
         (["simulate", "--solver", "eq8", "--steps", "5"], ["eq8 is not a scheme"]),
-        (["simulate", "--steps", "1"], ["steps = 1", "[2, 1000000000]"]),
+        *(
+            (["simulate", "--steps", n], [f"steps = {n} is not", "[2, 1000000000]"])
+            for n in ("1", "0", "-3", "9999999999")
+        ),
+        (["simulate", "--steps", "2.5"], ["'2.5' is not a whole number"]),
+        *((["certify", "eq8", "--seed", n], [f"'{n}' is not a whole number in [0, 2^63)"]) for n in ("-1", "nan")),
+        (["fit", "a.csv", "--noise", "1e7"], ["'1e7' is not a number in (0, 1e6)"]),
+        (["fit", "a.csv", "--minutes", "-1"], ["'-1' is not a number in (0, 1e6)"]),
         (["simulate", "--out", "nowhere/a.csv"], ["the folder nowhere does not exist"]),
         (["compare", "eq8", "missing.csv"], ["missing.csv: cannot be read"]),
         (["compare", "eq8", "zzz"], ["solver 'zzz' is unknown", "known: "]),
@@ -102,7 +109,6 @@ def test_models_lists_everything_with_reasons(capsys):
         (["report", "--quik"], ["flipproof report: option '--quik' is unknown", "did you mean '--quick'?"]),
         (["--versoin"], ["option '--versoin' is unknown", "did you mean '--version'?"]),
         (["simulate", "--solver"], ["flipproof: error: "]),
-        (["simulate", "--steps", "-3"], ["flipproof: error: "]),
         (["simulate", "a.toml", "b.toml"], ["flipproof simulate takes no further argument: b.toml"]),
     ],
 )

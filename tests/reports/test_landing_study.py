@@ -528,15 +528,24 @@ def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():
     [
         (["land", "--restitution", "1.2"], "table.restitution = 1.2 is outside [0, 1]"),
         (["land", "--restitution", "-0.1"], "table.restitution = -0.1 is outside [0, 1]"),
-        (["land", "--friction", "-1"], "table.friction = -1.0 is outside [0,"),
+        *(
+            (["land", "--friction", wrong], f"table.friction = {float(wrong)!r} is outside [0, 1e+15]")
+            for wrong in ("-1", "1e16", "nan")
+        ),
+        (["land", "--friction", "rough"], "'rough' is not a number"),
+        (["land", "--height", "1e16"], "table.height = 1e+16 m is outside [-1e+15, 1e+15]"),
         (["land", "--height", "9"], "table.height = 9 m is not reached from above"),
         (["land", "--height", "-90"], "table.height = -90 m is not reached within"),
         (["land", "--law", "after"], "law = 'after' is unknown; known: together, in-turn"),
         (["land", "--programs", "box2d"], "program = 'box2d' is unknown"),
         (["land", "--slices", "0"], "'0' is not a whole number of at least 1"),
         (["upright", "--out", "x", "--throws", "0"], "'0' is not a whole number of at least 1"),
-        (["upright", "--out", "x", "--fillings", "0.2,1.2"], "1.2 is outside (0, 1]"),
+        *(
+            (["upright", "--out", "x", "--fillings", wrong], "is not X,Y,Z, fill fractions in (0, 1] that increase")
+            for wrong in ("0.2,1.2", "1e7", "0.2,x", "0.3,0.2", "0.2,0.2")
+        ),
         (["upright", "--out", "x", "--families", "C"], "--families 'C' is unknown"),
+        (["upright", "--out", "x", "--scatter", "1e7,0,0"], "three numbers in [0, 1e6)"),
         (["upright", "--out", "x", "--scatter", "1,2"], "is not SPIN,DEGREES,SPEED"),
         (["upright", "--out", "x", "--scatter", "0,0,0"], "without scatter all throws of a point are the same throw"),
         (["upright", "--out", "x", "--scatter", "1e-18,0,0"], "the largest at least 1e-6"),

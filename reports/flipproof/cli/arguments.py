@@ -110,12 +110,18 @@ def sides(text: str) -> tuple[int, int]:
 
 
 def numbers(text: str) -> tuple[float, ...]:
-    """Return numbers between commas."""
-    return tuple(number(part.strip()) for part in text.split(","))
+    """Return numbers between commas; raise ValueError for anything else."""
+    return tuple(float(part) for part in text.split(","))
 
 
 count = reader("a whole number of at least 1", digits, lambda value: value >= 1)
+seed = reader("a whole number in [0, 2^63)", digits, lambda value: value < 2**63)
 number = reader("a number in (-1e6, 1e6)", float, lambda value: abs(value) < 1e6)
+positive = reader("a number in (0, 1e6)", float, lambda value: 0.0 < value < 1e6)
+
+whole = reader("a whole number", int, lambda _: True)
+real = reader("a number", float, lambda _: True)
+"""Numbers of fields that know and say their own range."""
 
 
 def output(text: str) -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flipproof.cli.arguments import add_command, add_json, check_outputs, number, output, write_json
+from flipproof.cli.arguments import add_command, add_json, check_outputs, output, real, write_json
 from flipproof.cli.progress import progress_bar
 from flipproof.figures.spoken import inert
 
@@ -20,7 +20,7 @@ def add_bounce(commands: Any) -> None:
         help="pymunk, mujoco, box2d, file.py:name, package.module:name or cmd:'program {height} {speed} {restitution} "
         "{gravity} {dt} {duration}', or cmd:'program' that reads them line by line; it runs with your rights",
     )
-    bounce.add_argument("--dt", type=number, default=1e-3, metavar="S", help="step in seconds (default 0.001)")
+    bounce.add_argument("--dt", type=real, default=1e-3, metavar="S", help="step in seconds (default 0.001)")
     add_json(bounce, "the passports")
     bounce.add_argument(
         "--plot", type=output, metavar="FILE.png", help="draw the passports, one row per engine (.png or .svg)"

@@ -16,7 +16,9 @@ from flipproof.cli.arguments import (
     count,
     number,
     output,
+    positive,
     read_scenario,
+    real,
 )
 from flipproof.cli.progress import progress_bar
 
@@ -42,7 +44,7 @@ def add_film(commands: Any) -> None:
     export.add_argument("--out", type=output, metavar="FILE", help="file to write (default: standard output)")
     export.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
     export.add_argument("--height", type=number, metavar="M", help="table above the cap at release [m]: stop there")
-    export.add_argument("--frame-rate", type=number, default=240.0, metavar="HZ", help="of the video (%(default)g)")
+    export.add_argument("--frame-rate", type=real, default=240.0, metavar="HZ", help="of the video (%(default)g)")
     export.add_argument("--start", type=number, default=0.0, metavar="S", help="time of release in the video (0)")
     export.add_argument(
         "--origin", type=_pair, default=(0.0, 0.0), metavar="X,Y", help="cap at release [m] (0,0); below 0 as "
@@ -64,7 +66,7 @@ def add_film(commands: Any) -> None:
         "--each", action="store_true", help="every FILE is a film of the same bottle: gamma and restitution are shared"
     )
     fit.add_argument(
-        "--minutes", type=_positive, default=10.0, metavar="M", help="give up a search after this many minutes; raise "
+        "--minutes", type=positive, default=10.0, metavar="M", help="give up a search after this many minutes; raise "
         "it for a slow solver such as mine.py:solve (%(default)g)",
     )  # fmt: skip
     fit.set_defaults(kind="fit")
@@ -76,14 +78,14 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--length-unit", default="", metavar="UNIT", help="of x and y of an export: m, cm, mm")
     command.add_argument("--time-unit", default="s", metavar="UNIT", help="of t of an export: s, ms (%(default)s)")
     command.add_argument(
-        "--frame-rate", type=number, metavar="HZ", help="frame rate of the recording, if t is slow motion"
+        "--frame-rate", type=real, metavar="HZ", help="frame rate of the recording, if t is slow motion"
     )
     command.add_argument("--scenario", metavar="THROW.toml", help=f"bottle and water; {SCENARIO_HELP}")
     command.add_argument("--slices", type=count, metavar="N", help="slices of every throw, gamma unchanged (50)")
     command.add_argument("--release", type=number, metavar="S", help="known time of release by the film's clock [s]")
     command.add_argument("--landing", type=number, metavar="S", help="known time of the touch by the film's clock [s]")
     command.add_argument("--table-height", type=number, metavar="M", help="known y of the table in the picture [m]")
-    command.add_argument("--noise", type=_positive, metavar="S", help="known noise of one coordinate [m, rad, rad/s]")
+    command.add_argument("--noise", type=positive, metavar="S", help="known noise of one coordinate [m, rad, rad/s]")
     command.add_argument(
         "--hold", nargs="+", default=[], choices=("tilt", "scale"), help="known: the camera is level; the picture's "
         "scale and clock are right",
@@ -213,10 +215,3 @@ def _pair(text: str) -> tuple[float, float]:
     if not comma:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y in m, such as 0.1,1.2")
     return number(x), number(y)
-
-
-def _positive(text: str) -> float:
-    value = number(text)
-    if not value > 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is outside (0, 1e6)")
-    return value

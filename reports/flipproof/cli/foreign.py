@@ -18,6 +18,7 @@ from flipproof.cli.arguments import (
     count,
     output,
     read_scenario,
+    seed,
     write_json,
     write_junit,
 )
@@ -45,7 +46,7 @@ def add_foreign(commands: Any) -> None:
         help="of its arithmetic, or of what it prints",
     )
     declared.add_argument("--order", type=float, metavar="P", help="order of its error before impacts")
-    certify.add_argument("--seed", type=int, metavar="K", help="seed of the random throws of the check elsewhere")
+    certify.add_argument("--seed", type=seed, metavar="K", help="seed of the random throws of the check elsewhere")
     add_json(certify, "the passport (traits, results, versions)")
     certify.add_argument("--junit", type=output, metavar="FILE", help="write the verdicts as JUnit XML")
     certify.add_argument("--badge", type=output, metavar="FILE", help="draw verdict and domain as SVG, for a README")
@@ -134,9 +135,9 @@ def command_certify(options: argparse.Namespace) -> int:
     def say(line: str) -> None:
         print(inert(line, lines=False), flush=True)
 
-    seed = SEED if options.seed is None else options.seed
+    drawn = SEED if options.seed is None else options.seed
     with closing(_opened(options, **given)) as runner:
-        certificate = certify(runner, equation=options.equation, seed=seed, say=lambda result: say(result.line))
+        certificate = certify(runner, equation=options.equation, seed=drawn, say=lambda result: say(result.line))
         write_json(options.json, certificate.to_mapping())
         write_junit(options.junit, findings_of(certificate), f"flipproof certify {certificate.traits.name}")
         if options.badge:

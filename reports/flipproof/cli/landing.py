@@ -6,32 +6,37 @@ import argparse
 import math
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Final
 
 from flipproof.cli.arguments import (
     SCENARIO_HELP,
     add_command,
     count,
-    digits,
-    number,
     numbers,
     read_scenario,
     reader,
+    real,
+    seed,
     sides,
 )
 from flipproof.cli.sweeps import add_store, fill
 
 SLICES: Final = 20
 
-seed = reader("a whole number in [0, 2^63)", digits, lambda value: value < 2**63)
 cells = reader(
     "COLUMNSxROWS, each in [2, 200], such as 24x24", sides, lambda counts: min(counts) >= 2 and max(counts) <= 200
 )
 scatter = reader(
-    "SPIN,DEGREES,SPEED, three numbers in [0, inf), the largest at least 1e-6: without scatter all throws of a point "
+    "SPIN,DEGREES,SPEED, three numbers in [0, 1e6), the largest at least 1e-6: without scatter all throws of a point "
     "are the same throw",
     numbers,
-    lambda values: len(values) == 3 and min(values) >= 0.0 and max(values) >= 1e-6,
+    lambda values: len(values) == 3 and all(0.0 <= value < 1e6 for value in values) and max(values) >= 1e-6,
+)
+fillings = reader(
+    "X,Y,Z, fill fractions in (0, 1] that increase",
+    numbers,
+    lambda values: all(before < value <= 1.0 for before, value in pairwise((0.0, *values))),
 )
 
 
@@ -41,7 +46,7 @@ def add_landing(commands: Any) -> None:
     land.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     where = land.add_mutually_exclusive_group()
     where.add_argument(
-        "--height", type=number, metavar="M", help="height of the table above the cap at release [m] (default: the "
+        "--height", type=real, metavar="M", help="height of the table above the cap at release [m] (default: the "
         "bottle, if upright, touches it at the end of the throw's duration)",
     )  # fmt: skip
     where.add_argument("--aim", choices=("A", "B"), help="solve for a throw that touches upright; see 'upright'")
@@ -59,7 +64,7 @@ def add_landing(commands: Any) -> None:
         "--slices", type=count, metavar="N", help="slices (default: 16 to 25 in turn, whose mean is the share)"
     )
     upright.add_argument(
-        "--fillings", type=_shares, metavar="X,Y,Z", help="fill fractions (default: eight, 0.1 to 0.95)"
+        "--fillings", type=fillings, metavar="X,Y,Z", help="fill fractions (default: eight, 0.1 to 0.95)"
     )
     upright.add_argument(
         "--families", default="A,B", metavar="A,B", help="A: omega_0 as thrown, height of the table solved for; B: "
@@ -76,8 +81,8 @@ def add_landing(commands: Any) -> None:
 
 
 def _add_table(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--restitution", type=number, default=0.3, metavar="E", help="of rim and table (%(default)s)")
-    command.add_argument("--friction", type=number, default=0.4, metavar="MU", help="of rim and table (%(default)s)")
+    command.add_argument("--restitution", type=real, default=0.3, metavar="E", help="of rim and table (%(default)s)")
+    command.add_argument("--friction", type=real, default=0.4, metavar="MU", help="of rim and table (%(default)s)")
 
 
 def command_land(options: argparse.Namespace) -> int:
@@ -138,14 +143,3 @@ def command_upright(options: argparse.Namespace) -> int:
             print(f"flipproof: {words}", file=sys.stderr, flush=True)
 
     return fill(options, lambda begin, where: make_upright(throw, size, options.out, begin, **where | {"say": say}))
-
-
-def _shares(text: str) -> tuple[float, ...]:
-    """Return increasing fill fractions in (0, 1]."""
-    values = numbers(text)
-    for value in values:
-        if not 0.0 < value <= 1.0:
-            raise argparse.ArgumentTypeError(f"{value:g} is outside (0, 1], as a fill fraction has to be")
-    if list(values) != sorted(set(values)):
-        raise argparse.ArgumentTypeError(f"{text!r} does not increase")
-    return values

@@ -34,6 +34,7 @@ from flipproof.cli.arguments import (
     read_scenario,
     refuse_overwriting,
     store_of,
+    whole,
 )
 from flipproof.cli.bounce import add_bounce
 from flipproof.cli.check import add_checks, add_compare
@@ -192,7 +193,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="see 'flipproof models'; or a spec such as mine.py:solve (%(default)s)",
     )
-    simulate.add_argument("--steps", type=count, metavar="P", help="points of a scheme's grid (default 1000)")
+    simulate.add_argument("--steps", type=whole, metavar="P", help="points of a scheme's grid (default 1000)")
     simulate.add_argument("--slices", type=count, metavar="N", help="cut the throw into N slices, alpha/2m unchanged")
     simulate.add_argument("--out", type=output, metavar="FILE.csv", help="file to write (default: standard output)")
 

@@ -182,7 +182,10 @@ def test_export_to_standard_output(capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--frame-rate", "0"), r"frame_rate = 0.0 1/s is outside \[1, 100000\]"),
+        *(
+            (("--frame-rate", wrong), rf"frame_rate = {float(wrong)!r} 1/s is outside \[1, 100000\]")
+            for wrong in ("0", "1e6", "nan")
+        ),
         (("--out", "/none/where.txt"), "the folder /none does not exist"),
         (("--out", str(EXAMPLES)), "is a folder; name a file"),
     ],
