@@ -151,7 +151,7 @@ class UnsuitableFileError(ValueError):
 def read_text(path: Path, max_bytes: int) -> str:
     """Return the UTF-8 text of a regular file of at most ``max_bytes`` bytes, or of what this program has open already.
 
-    A path such as /dev/stdin names an open descriptor, so that a shell may feed a pipe.
+    A byte-order mark is left out. A path such as /dev/stdin names an open descriptor, so that a shell may feed a pipe.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def read_text(path: Path, max_bytes: int) -> str:
     if len(content) > max_bytes:
         largest = f"{max_bytes / 2**10:g} KiB" if max_bytes < 2**20 else f"{max_bytes / 2**20:g} MiB"
         raise UnsuitableFileError(f"is larger than {largest}, the most that is read of such a file")
-    return content.decode("utf-8")
+    return content.decode("utf-8-sig")
 
 
 def read_toml(path: str | PathLike[str], max_bytes: int) -> tuple[dict[str, Any], str]:
@@ -410,6 +410,8 @@ class Scenario:
     @classmethod
     def from_mapping(cls, document: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
         """Build a scenario from ``{"scenario": {...}, "bottle": {...}}``; errors name ``source``."""
+        if problem := stray_key(document, ("scenario", "bottle")):
+            raise ScenarioError(f"{source}: {problem}")
         _refuse_unknown(document, ("scenario", "bottle"), f"{source}: table")
         for table in document:
             if not isinstance(document[table], Mapping):
@@ -475,6 +477,15 @@ def refuse_other(argument: str, value: object, noun: type) -> None:
     """Raise ValueError if ``value`` is not a ``noun`` of this package."""
     if not isinstance(value, noun):
         raise ValueError(f"{argument} = {shown(value)} is not a slicemodel.{noun.__name__}")
+
+
+def stray_key(document: Mapping[str, Any], tables: Collection[str]) -> str:
+    """Return what is wrong with a key of a file that stands outside of its tables, or an empty string."""
+    for name, value in document.items():
+        first = value[0] if isinstance(value, list) and value else value
+        if name not in tables and not isinstance(first, Mapping):
+            return f"key {shown(name)} stands outside of a table; write the line of a table such as [scenario] above it"
+    return ""
 
 
 def _refuse_unknown(given: Iterable[str], allowed: Iterable[str], label: str) -> None:

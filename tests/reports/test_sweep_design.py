@@ -133,6 +133,8 @@ def test_a_latin_hypercube_reaches_every_kind_of_field():
         ('design = "grid"', 'design = "grid"\nseeds = 3', ["[sweep] key 'seeds' is unknown", "'seed'?"]),
         ('design = "grid"', 'design = "grid"\nsamples = 3', ["samples = 3 belongs to design = \"latin-hypercube\""]),
         ('design = "grid"', 'design = "latin-hypercube"', ["count belongs to a grid"]),
+        ("[sweep]", "water_mass = 0.3\n[sweep]", ["key 'water_mass' stands outside of a table"]),
+        ("[[solvers]]", "[[solver]]\n[[solvers]]", ["table 'solver' is unknown", "'solvers'?"]),
         ("[sweep]", "[swoop]\nx = 1\n[sweep]", ["table 'swoop' is unknown", "'sweep'?"]),
         ("[sweep]", "[scenario]\nomega = 2.0\n[sweep]", ["[scenario] key 'omega' is unknown", "'omega0'?"]),
         ("[sweep]", "[scenario]\ndrag = -1.0\n[sweep]", ["[scenario] drag = -1.0 kg/s is outside [0, 1e+15]"]),

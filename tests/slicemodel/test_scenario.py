@@ -138,6 +138,11 @@ def test_toml_and_pickle_round_trip(tmp_path):
     assert Scenario.from_toml(file) == pickle.loads(pickle.dumps(scenario)) == scenario
 
 
+def test_the_byte_order_mark_of_a_text_editor_is_read_over(tmp_path):
+    (tmp_path / "throw.toml").write_text("[scenario]\ndrag = 0.25\n", encoding="utf-8-sig")
+    assert Scenario.from_toml(tmp_path / "throw.toml").drag == 0.25
+
+
 def test_empty_file_is_the_default_throw(tmp_path):
     (tmp_path / "empty.toml").touch()
     assert Scenario.from_toml(str(tmp_path / "empty.toml")) == Scenario()
@@ -150,6 +155,7 @@ def test_empty_file_is_the_default_throw(tmp_path):
         ("[bottle]\nlenght = 1", ["[bottle] key 'lenght'", "did you mean 'length'?"]),
         ("[botle]\nlength = 1", ["table 'botle'", "did you mean 'bottle'?"]),
         ("[engine]\nx = 1", ["table 'engine'", "known: scenario, bottle"]),
+        ("water_mass = 0.3", ["key 'water_mass' stands outside of a table", "such as [scenario]"]),
         ("scenario = 3", ["scenario = 3 is not a table"]),
         ("[bottle]\nradius = -1", ["[bottle] radius = -1.0 m"]),
         ("[scenario]\nrestitution = 2", ["[scenario] restitution = 2.0", "[0, 1]"]),
@@ -159,7 +165,7 @@ def test_empty_file_is_the_default_throw(tmp_path):
         ("[scenario]\nn_slices = " + "9" * 5000, ["not valid TOML"]),
         ("[scenario]\ndrag = '" + "9" * 200_000 + "'", ["[scenario] drag = '999", " ... 999", "is not a number"]),
         ("[scenario]\n" + "x" * 200_000 + " = 1", ["[scenario] key 'xxx", " ... xxx"]),
-        ("x = [" + "1," * 60_000 + "]", ["table 'x'"]),
+        ("x = [" + "1," * 60_000 + "]", ["key 'x'"]),
         ("# " + "x" * 300_000, ["is larger than 256 KiB"]),
     ],
 )

@@ -103,7 +103,7 @@ def read_summary(path: Path) -> dict[str, Any]:
     """Return the summary in a report's folder, or in its file; raises ValueError, naming the file and what is wrong."""
     file = path / "summary.json" if path.is_dir() else path
     try:
-        summary = json.loads(read_text(file, 2**28).removeprefix("\ufeff"))
+        summary = json.loads(read_text(file, 2**28))
     except UnsuitableFileError as error:
         raise ValueError(f"{file}: {error}") from None
     except OSError as error:

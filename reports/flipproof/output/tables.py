@@ -122,7 +122,7 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
     Raises ValueError if the file cannot be read, is empty, names a column twice, or has a row of another length.
     """
     try:
-        lines = read_text(path, 2**26).removeprefix("\ufeff").splitlines()
+        lines = read_text(path, 2**26).splitlines()
     except UnsuitableFileError as error:
         raise ValueError(f"{path}: {error}") from None
     except (OSError, UnicodeDecodeError) as error:

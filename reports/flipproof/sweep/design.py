@@ -37,7 +37,7 @@ from flipproof.sweep.axes import DAMPING, FILL, Axis, Choices, Range, Value, rea
 from flipproof.sweep.entries import Entry, read_entries
 from flipproof.sweep.errors import SweepError, refuse, refuse_unknown
 from flipproof.sweep.work import FLIGHTS, Point
-from slicemodel.scenario import Scenario, ScenarioError, not_whole, read_toml
+from slicemodel.scenario import Scenario, ScenarioError, not_whole, read_toml, stray_key
 from slicemodel.trajectory import FloatArray
 
 MAX_POINTS: Final = 1_000_000
@@ -135,7 +135,10 @@ def read_design(path: Path) -> Design:
 
 def design_of(document: Mapping[str, Any], source: str) -> Design:
     """Build a design from what its file holds; errors name ``source``."""
-    refuse_unknown(f"{source}: table", document, ("scenario", "bottle", "sweep", "solvers"))
+    tables = ("scenario", "bottle", "sweep", "solvers")
+    problem = stray_key(document, tables)
+    refuse(problem and f"{source}: {problem}")
+    refuse_unknown(f"{source}: table", document, tables)
     table = document.get("sweep")
     if not isinstance(table, Mapping):
         raise SweepError(f'{source}: has no table [sweep]; write at least [sweep] design = "grid"')
