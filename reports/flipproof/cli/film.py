@@ -108,6 +108,9 @@ def command_film(options: argparse.Namespace) -> int:
     from flipproof.film.judge import Assessment, UnsoundError, compared, ranked, shared_draws
 
     each_film = options.kind == "fit" and options.each
+    for k, path in enumerate(options.files):
+        if path in options.files[:k]:
+            raise ValueError(f"{path} is there twice")
     if each_film and len(options.model) > 1:
         raise ValueError("--each fits one equation to several films; name one --model")
     scenario = read_scenario(options.scenario)

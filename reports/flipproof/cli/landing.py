@@ -103,7 +103,8 @@ def command_land(options: argparse.Namespace) -> int:
     elif height is None:
         height = standing(throw).height
     table = Table(height=height, restitution=options.restitution, friction=options.friction)
-    rows = beside(land_throw, throw, table, options.law, [name.strip() for name in options.programs.split(",")])
+    programs = list(dict.fromkeys(name.strip() for name in options.programs.split(",")))
+    rows = beside(land_throw, throw, table, options.law, programs)
     print(describe(rows, table))
     return 0
 

@@ -87,9 +87,11 @@ def opened(
     ``given`` are traits of a program or a folder, which cannot declare them. ``curves`` also admits a curve in a file,
     which answers one throw at its own times and nothing else.
     """
+    kind, body = split_spec(spec)
+    if given and kind == OBJECT:
+        raise ValueError(f"solver {spec!r}: says itself what it is: {', '.join(given)} cannot be given")
     if not is_foreign(spec):
         return Own(solvers.find(spec))
-    kind, body = split_spec(spec)
     if kind != OBJECT:
         if kind == COMMAND:
             return Isolated(spec, timeout, memory, traits_of_command(spec, timeout, given))
@@ -98,8 +100,6 @@ def opened(
         if not curves:
             check_asked(spec)
         return File(spec)
-    if given:
-        raise ValueError(f"solver {spec!r}: says itself what it is: {', '.join(given)} cannot be given")
     locate(spec)
     return Isolated(spec, timeout, memory)
 

@@ -148,8 +148,9 @@ def test_what_a_program_cannot_say_is_given():
     assert (traits.name, traits.refined_by, traits.precision) == ("mine", "rtol", "float32")
     with pytest.raises(ValueError, match=r"needs \{effort\} in the command"):
         opened("cmd:program {out}", given={"refined_by": "dt"})
-    with pytest.raises(ValueError, match="says itself what it is"):
-        opened("mine.py:solve", given={"order": 2.0})
+    for own in ("mine.py:solve", "eq8"):
+        with pytest.raises(ValueError, match="says itself what it is"):
+            opened(own, given={"order": 2.0})
 
 
 @pytest.mark.parametrize(

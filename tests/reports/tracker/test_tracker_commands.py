@@ -111,6 +111,8 @@ REFUSED = {
     "unknown track": (("--cap", "cop", *BOTH[2:]), "track 'cop' is unknown; did you mean 'cap'"),
     "one track": (BOTH[:2], "--cap and --base"),
     "frame rate": ((*BOTH, "--frame-rate", "0"), "frame_rate = 0 1/s is outside"),
+    "twice": ((EXAMPLES / "tab.txt", *BOTH), r"tab\.txt is there twice"),
+    "no tracks named": ((), "has no column t; .* needs --cap and --base"),
     "order": ((*BOTH, "--release", "0.5", "--landing", "0.4"), "landing = 0.4 s does not follow release = 0.5 s"),
 }
 
