@@ -177,7 +177,7 @@ CHAPTER: Final = Chapter(
     claims=claims,
     figures=figures,
     page=page,
-    # Less than a minute of one core.
+    # About a minute of one core.
     work={
         "full": Size(
             families=("B",),
