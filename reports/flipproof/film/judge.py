@@ -183,7 +183,8 @@ class Assessment:
                 f"{advice}"
             )
         if estimate.likelihood.planar:
-            if (lasts := estimate.likelihood.touch - float(x[0])) < MIN_FLIGHT:
+            lasts = estimate.likelihood.touch - float(x[0])
+            if lasts < MIN_FLIGHT and (held.release is None or held.touch is None):
                 raise UnsoundError(
                     f"{film.label}: the flight found lasts {lasts:.3g} s, from {x[0]:.4g} s on; a flip lasts "
                     f"{MIN_FLIGHT:g} s at least: give --release and --landing, and see whether it is water that flies"

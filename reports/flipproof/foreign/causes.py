@@ -86,9 +86,9 @@ def time_cause(intervals: Sequence[Interval]) -> str:
         flies = (i.after == 0) & (i.before == 0)
         delays.append(delay)
         shifted = i.expected["v"][flies] * delay
-        if rms(shifted):
+        if flies.any():
             agree.append(rms((i.expected["r"] - i.r[1])[flies] - shifted) < 0.1 * rms(shifted))
-    if not agree or np.mean(agree) < 0.5 or rms(delays) < 1e-7 * intervals[0].throw.duration:
+    if 2 * len(agree) < len(intervals) or np.mean(agree) < 0.5 or rms(delays) < 1e-7 * intervals[0].throw.duration:
         return ""
     if np.median(np.abs(delays)) < 0.3 * rms(delays):
         return (
@@ -316,6 +316,7 @@ def _undisturbed(intervals: Sequence[Interval]) -> list[Interval]:
 
 
 WEIGHT_OF_ITS_OWN: Final = "cos(theta), in m/s^2,"
+"""Term of a throw without gravity."""
 
 
 def _motion_cause(intervals: Sequence[Interval]) -> str:
