@@ -12,13 +12,6 @@ from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray
 
 
-def true_or_false(name: str, value: object) -> bool:
-    """Return ``value`` as bool if it is one, else raise ValueError."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise ValueError(f"{name} = {value!r} is not True or False")
-    return bool(value)
-
-
 def number_above(name: str, value: object, above: float, maximum: float, unit: str = "") -> float:
     """Return ``value`` as float if it lies in (above, maximum], else raise ValueError; NaN lies in no range."""
     number = _finite(value)

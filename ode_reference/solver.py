@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import number_within, true_or_false, velocities_of
+from ode_reference.arguments import number_within, velocities_of
 from ode_reference.combinations import is_ours, model_of, require_own_switches
 from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import Switches, are_switches
-from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other
+from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other, true_or_false
 from slicemodel.trajectory import Trajectory, check_states, output_times, times_given
 
 if TYPE_CHECKING:

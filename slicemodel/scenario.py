@@ -473,6 +473,15 @@ def known_name(argument: str, name: object, choices: Collection[str]) -> str:
     raise ValueError(unknown_name(f"{argument} =", name, choices))
 
 
+def true_or_false(argument: str, value: object) -> bool:
+    """Return ``value`` as bool if it is one, of Python's or NumPy's, else raise ValueError."""
+    import numpy as np
+
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{argument} = {value!r} is not True or False")
+    return bool(value)
+
+
 def refuse_other(argument: str, value: object, noun: type) -> None:
     """Raise ValueError if ``value`` is not a ``noun`` of this package."""
     if not isinstance(value, noun):

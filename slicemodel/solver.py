@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other, unknown_name
+from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other, true_or_false, unknown_name
 from slicemodel.schemes import SCHEMES, Scheme, StepConstants, StepForm
 from slicemodel.trajectory import FloatArray, Impacts, Trajectory, check_states
 
@@ -80,9 +80,7 @@ def solve(
     refuse_other("scenario", scenario, Scenario)
     chosen, form, steps = checked(scheme, steps, rebound)
     if lagged is not None:
-        if not isinstance(lagged, (bool, np.bool_)):
-            raise ValueError(f"lagged = {lagged!r} is not True or False")
-        form = form._replace(lagged=bool(lagged))
+        form = form._replace(lagged=true_or_false("lagged", lagged))
     if store not in get_args(Store):
         raise ValueError(unknown_name("store =", store, get_args(Store)))
     if store == "full":

@@ -1,7 +1,6 @@
 """Docs that point somewhere point somewhere that exists."""
 
 import argparse
-import contextlib
 import re
 import shlex
 import subprocess
@@ -68,16 +67,13 @@ def test_every_command_of_the_readme_is_understood_and_its_files_exist():
 
 @pytest.mark.parametrize("page", [*PAGES, "CONTRIBUTING.md"])
 def test_every_command_of_the_page_is_understood(page):
-    """Lines of code, and what stands within a line if it is more than a name."""
+    """In blocks of code, fenced or indented, and within a line if it is more than a name."""
     text = (ROOT / page).read_text(encoding="utf-8")
     spans = [" ".join(span.split()) for span in re.findall(r"(?<!`)`(flipproof [^`]+)`", text)]
-    commands = [shlex.split(span) for span in spans if span.count(" ") > 2]
-    for line in re.findall(r"^(?:    )?(flipproof .*)$", text, re.MULTILINE):
-        with contextlib.suppress(ValueError):  # prose with an apostrophe
-            commands.append(shlex.split(line, comments=True))
-    for _, *arguments in commands:
-        if arguments[0] in subcommands():
-            parser().parse_args(arguments)
+    code = "".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL) + re.findall(r"^    .*\n", text, re.MULTILINE))
+    lines = re.findall(r"^ *(flipproof .*)$", code, re.MULTILINE)
+    for command in (*lines, *(span for span in spans if span.count(" ") > 2)):
+        parser().parse_args(shlex.split(command, comments=True)[1:])
 
 
 def subcommands():

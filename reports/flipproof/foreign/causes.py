@@ -131,8 +131,8 @@ def _impact_cause(intervals: Sequence[Interval], *, recoil: bool) -> str:
         return f"{_restitution_cause(single)}, and the others are right"
     if not recoil:
         return "the slice that strikes and the others are off, which no impact of this equation moves"
-    if e := _common_restitution(single):
-        return e
+    if cause := _common_restitution(single):
+        return cause
     if own_error < 0.05 * other_error:
         return "the slice that strikes is right, the others are not: look at the recoil of the tube"
     alike = np.array(
@@ -152,19 +152,18 @@ def _goes_on(interval: Interval) -> bool:
 
 def _common_restitution(intervals: Sequence[Interval]) -> str:
     """Return with what restitution all speeds go, of the slice that strikes and by recoil, if one explains them."""
-    texts: dict[float, list[float]] = {}
+    measured: dict[float, list[float]] = {}
     for i in intervals:
         free = (i.after == 0) & (i.before == 0)
         change, errors, e = (i.expected["v"] - i.v[0])[free], (i.v[1] - i.expected["v"])[free], i.throw.restitution
         factor = float(change @ errors) / max(float(change @ change), 1e-300)
         if len(change) > 1 and rms(errors - factor * change) < 0.2 * rms(errors):
-            texts.setdefault(e, []).append(e + factor * (1.0 + e))
-    if sum(map(len, texts.values())) < 0.7 * len(intervals):
+            measured.setdefault(e, []).append(e + factor * (1.0 + e))
+    if sum(map(len, measured.values())) < 0.7 * len(intervals):
         return ""
-    words = [
-        f"{np.median(values):.2g} where it is {e:.3g}" for e, values in sorted(texts.items()) if np.std(values) < 0.1
-    ]
-    return f"slices rebound, and the tube recoils, as if e were {' and '.join(words)}" if words else ""
+    narrow = [(float(np.median(values)), e) for e, values in sorted(measured.items()) if np.std(values) < 0.1]
+    words = " and ".join(f"{median:.2g} where it is {e:.3g}" for median, e in narrow)
+    return words and f"slices rebound, and the tube recoils, as if e were {words}"
 
 
 def _restitution_cause(intervals: Sequence[Interval]) -> str:

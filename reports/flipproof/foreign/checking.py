@@ -6,7 +6,7 @@ ask after the other (``certify``), or a folder of answers computed elsewhere (``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
@@ -76,6 +76,11 @@ def effort_of(traits: Traits, scenario: Scenario, level: float) -> float | None:
 def shift(first: Answer, second: Answer, scale: float) -> float:
     """Return the largest difference of two curves omega(t), as a fraction of ``scale``."""
     return float(np.max(np.abs(first.omega - second.omega)) / abs(scale))
+
+
+def decimals_of(fields: Collection[FloatArray], candidates: Iterable[int]) -> int | None:
+    """Return the first of some numbers of decimals with which all fields are printed exactly; None: with none."""
+    return next((d for d in candidates if all(np.array_equal(np.round(values, d), values) for values in fields)), None)
 
 
 def time_of_max(times: FloatArray, values: FloatArray) -> str:

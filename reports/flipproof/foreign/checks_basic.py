@@ -19,6 +19,7 @@ from flipproof.foreign.checking import (
     NotApplicableError,
     Observation,
     ask_of,
+    decimals_of,
     shift,
     time_of_max,
 )
@@ -554,11 +555,10 @@ def _parts_advice(r: FloatArray, inertia: FloatArray) -> str:
 
 def _decimals_advice(answer: Answer) -> str:
     """Return that the inertia is printed with few decimals, if it is: in kg m^2 that leaves few digits."""
-    inertia = answer.inertia
-    for decimals in range(3, 10) if "inertia" in answer.given else ():
-        if inertia is not None and np.array_equal(np.round(inertia, decimals), inertia):
-            return f"inertia has {decimals} decimals, which are few digits: print all digits (%.17g); "
-    return ""
+    if answer.inertia is None or "inertia" not in answer.given:
+        return ""
+    decimals = decimals_of([answer.inertia], range(3, 10))
+    return f"inertia has {decimals} decimals, which are few digits: print all digits (%.17g); " if decimals else ""
 
 
 def check_velocity(traits: Traits) -> CheckGenerator:

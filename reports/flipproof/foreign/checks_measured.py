@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
@@ -20,6 +20,7 @@ from flipproof.foreign.checking import (
     NotApplicableError,
     Observation,
     ask_of,
+    decimals_of,
     shift,
 )
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
@@ -56,11 +57,13 @@ def check_digits(traits: Traits) -> CheckGenerator:
     facts: dict[str, Any] = {"digits": digits, "arithmetic": "float32" if singles else None}
     expected = f"numbers of {traits.precision}"
     if digits <= 8:
+        decimals = decimals_of(values.values(), range(2, 9))
+        few = f", {decimals} decimals of every number: few digits of a small one" if decimals else ""
         required = int(traits.precision[0]) if traits.precision.endswith("digits") else 6
         return Observation(
             holds=digits >= required,
             expected=expected,
-            observed=f"printed with {digits} digits{_decimals(values.values())}",
+            observed=f"printed with {digits} digits{few}",
             advice='print all digits ("%.17g")',
             weak="print all digits (%.17g)" if traits.precision in ("float64", "float32") else "",
             facts=facts | {"precision": f"{max(6, digits)} digits"},
@@ -81,14 +84,6 @@ def _digits(values: FloatArray) -> int:
         if all(float(f"{x:.{digits}g}") == x for x in numbers):
             return digits
     return 17
-
-
-def _decimals(fields: Collection[FloatArray]) -> str:
-    """Return how many decimals all numbers have, in words; empty if it is more than 8."""
-    for decimals in range(2, 9):
-        if all(np.array_equal(np.round(values, decimals), values) for values in fields):
-            return f", {decimals} decimals of every number: few digits of a small one"
-    return ""
 
 
 def check_refinement(traits: Traits) -> CheckGenerator:
