@@ -19,10 +19,9 @@ def add_scene(commands: Any) -> None:
 
 def command_scene(options: argparse.Namespace) -> int:
     """Write the scene."""
-    from flipproof.output.folder import check_replaceable, replaced_folder
+    from flipproof.output.folder import replaced_folder
     from flipproof.output.scene import write_scene
 
-    check_replaceable(options.out, "scene")
     throw = read_scenario(options.scenario, options.slices)
     with replaced_folder(options.out, "scene") as folder:
         write_scene(throw, folder, options.format)
