@@ -3,12 +3,14 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from made_up import command, refused
 
+import ode_reference
 from flipproof.output.scene import write_scene
 from slicemodel import Scenario
 
@@ -102,5 +104,10 @@ def test_the_command_writes_the_folder_and_refuses_ice(tmp_path, capsys):
     assert b"usage: python readback.py mujoco" in subprocess.run(asked, capture_output=True, check=False).stderr
     throw.write_text("[scenario]\nfrozen = true\n")
     refused(capsys, "frozen", "scene", throw, "--out", tmp_path / "ice")
-    throw.write_text("[scenario]\nduration = 1e9\n")
-    refused(capsys, "stalled: free-flight: stiff", "scene", throw, "--slices", "3", "--out", tmp_path / "long")
+
+
+def test_a_flight_that_stops_before_its_end_has_no_scene(tmp_path, monkeypatch):
+    stopped = replace(ode_reference.solve(THROW), status="stalled", message="too stiff")
+    monkeypatch.setattr("ode_reference.solve", lambda *_: stopped)
+    with pytest.raises(ValueError, match="there are no answers for this throw: stalled: too stiff"):
+        write_scene(THROW, tmp_path)
