@@ -47,12 +47,12 @@ def test_charts_and_sentences_have_the_spoken_names_of_solvers(text, said):
 
 
 def test_a_figure_has_spoken_names_and_indices_everywhere():
-    figure, axes = new_figure()
+    figure, (axes, _) = new_figure(1, 2, sharey=True)
     axes.plot([0, 1], [0, 1], label="eq8-wall")
     axes.set_xlabel("fill fraction M_w / M_max [1]")
-    axes.set_yticks([0, 1], ["drag against C_M", "free-flight"])
+    axes.set_yticks([0, 1], ["drag against C_M", "free-flight"])  # of both panels
     axes.legend()
-    draw(figure, png=False)
+    assert r"\$" not in draw(figure, png=False).svg
     assert axes.get_legend().get_texts()[0].get_text() == "Eq. 8 (drag on the wall)"
     assert axes.get_xlabel() == r"fill fraction $M_{\mathrm{w}}$ / $M_{\mathrm{max}}$ [1]"
     assert [label.get_text() for label in axes.get_yticklabels()] == [r"drag against $C_{\mathrm{M}}$", "free flight"]

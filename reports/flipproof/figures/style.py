@@ -75,6 +75,13 @@ class PlainPowers(LogFormatterMathtext):
         return f"10{str(exponent).translate(SUPERSCRIPTS)}"
 
 
+class WrittenLabels(FuncFormatter):
+    """The labels of another formatter as ``_written`` gives them, once, although several panels may share it."""
+
+    def __init__(self, form: FuncFormatter) -> None:
+        super().__init__(lambda x, place: _written(form(x, place)))
+
+
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """One finished figure as SVG text, and as PNG bytes if somebody asked for them."""
@@ -105,8 +112,8 @@ def draw(figure: Figure, png: bool = True) -> Drawing:
             form = axis.get_major_formatter()
             if isinstance(form, LogFormatterMathtext):
                 axis.set_major_formatter(PlainPowers())
-            elif isinstance(form, FuncFormatter):  # labels that were given, not computed
-                axis.set_major_formatter(FuncFormatter(lambda x, place, form=form: _written(form(x, place))))
+            elif type(form) is FuncFormatter:  # labels that were given, not computed
+                axis.set_major_formatter(WrittenLabels(form))
     for text in figure.findobj(Text):
         text.set_text(_written(text.get_text()))
     lines, points = BytesIO(), BytesIO()
