@@ -59,7 +59,7 @@ DOUBLE: Final = "twice the step"
 EARLIER: Final = "the trial before"
 BENT: Final = "a bottle that differs by a step or two"
 BEND_STEPS: Final = (1.0, 2.0)
-SHAKEN: Final = "slices that begin up to a step or two elsewhere"
+SHAKEN: Final = "slices moved at the start by up to the travel of two steps"
 SHAKE_STEPS: Final = (1.0, 1.0, 2.0, 2.0)
 EXCHANGES: Final = 2.0
 """Factor on what slices that begin elsewhere leave: a few such throws show only some of the exchanges of impacts."""

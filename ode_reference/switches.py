@@ -25,7 +25,9 @@ def are_switches(name: object) -> TypeGuard[str]:
 
 @dataclass(frozen=True, slots=True)
 class Switches:
-    """Which mistakes are mended; all off is ``published-limit``, all on is ``free-flight``.
+    """Which assumptions are changed: mistakes that are mended, but for ``drag_on_centre``.
+
+    All off is ``published-limit``, all on is ``free-flight``.
 
     Parameters
     ----------

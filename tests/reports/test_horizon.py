@@ -161,9 +161,9 @@ def test_the_figure_labels_band_sizes_and_horizons():
     studies.append(replace(studies[1], own_throw=True))
     figure = figure_horizon([*studies, studies[1]])
     assert [axes.get_title(loc="left") for axes in figure.axes[:3]] == [
-        "pymunk",
-        "free-flight",
-        "free-flight, this throw",
+        "pymunk, N = 5",
+        "free-flight, N = 5",
+        "free-flight, this throw, N = 5",
     ]
     assert {axes.get_yscale() for axes in figure.axes} == {"log"}
     assert all(axes.get_xlabel() == "time t [s]" for axes in figure.axes[1:])

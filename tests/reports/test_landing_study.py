@@ -374,7 +374,7 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
         assert "ssumed: e_table = 0.3" in exhibit.caption
     assert shares_csv(found).count("\n") == len(found.cells) + 1
     ((family, fills, rows),) = page(found)["shares"]
-    assert family == "family B: time of flight as thrown"
+    assert family == "time of flight as thrown"
     assert [name for name, _ in rows] == ["water, together", "water, in turn", "ice"][: len(rows)]
     assert all(len(cells) == len(fills) for _, cells in rows)
 
@@ -436,7 +436,7 @@ def copied(swept, tmp_path, monkeypatch):
 
 def test_the_sweep_makes_the_same(found, swept):
     out, said, words = swept
-    assert "P(upright), family B" in words
+    assert "P(upright), time of flight as thrown" in words
     assert said[0].startswith("aims: ")
     assert (out / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
     assert len(list(out.glob("*.svg"))) == len(list(out.glob("*.png"))) == 3

@@ -71,7 +71,7 @@ def test_levels_bands_cost_and_distance_from_ice_are_read_off():
     claim = claim_column(study)
     assert claim.value == pytest.approx(-0.598)
     assert "no share; free flight at N = 4" in claim.note
-    assert "at most −0.598, at filling 100 %" in next(figures((study, None))).caption
+    assert "largest in size −0.598, at filling 100 %" in next(figures((study, None))).caption
     assert study.missing_from_ice(EXCLUDE) == pytest.approx(0.004)
     assert study.missing_from_ice(PASS) == pytest.approx(0.6)
     assert study.throw.restitution == 0.5

@@ -127,7 +127,8 @@ def test_what_the_snapshot_found_is_told_in_full():
     kept = json.loads(KEPT.read_text(encoding="utf-8")) | {"solvers": solvers, "paper": {"experiment": experiment}}
     told = story(kept, {})
     assert [name for name, number in vars(told.n).items() if number is None] == []
-    assert [layer.name for layer in told.layers] == ["The time step", "The algebra of Eq. 9", "The physics of Eq. 8"]
+    names = ["The time step", "The formulas of the program", "The physics of Eq. 8"]
+    assert [layer.name for layer in told.layers] == names
     assert [layer.within for layer in told.layers] == [True, False, False]
     assert len(told.shares) == len(NAMES) == len(CHANGES)
     assert {share.name for share in told.shares} == set(CHANGES) == set(NAMES.values())

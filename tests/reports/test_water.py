@@ -104,6 +104,16 @@ def test_by_plateau_rods_come_nearest_and_overlap_is_worst_in_a_full_bottle(foun
     assert all(found.time("rods", filling) < flight["early"] for filling, flight in late_fluid().items())
 
 
+def test_half_full_rods_lie_in_the_range_thanks_to_our_own_fluid_alone(found):
+    """As LIMITS, the story and docs/water.md say, and that the start of the water changes more than rods and column."""
+    (_, recorded, _), (_, low, high) = recorded_band(), own_band()
+    half = fluids()["fillings"].index(0.5)
+    assert recorded[half] - found.at("rods", 0.5) == pytest.approx(0.01, abs=0.002)
+    assert low[half] < found.at("rods", 0.5) < high[half]
+    _, least, most = start_band()
+    assert most[1] - least[1] > 3 * abs(found.at("column", 0.5) - found.at("rods", 0.5))
+
+
 def test_our_own_fluid_is_held_against_what_the_text_says_of_real_bottles():
     for suction in (False, True):
         recorded = flights(suction=suction)

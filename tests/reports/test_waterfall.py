@@ -162,6 +162,6 @@ def test_other_counts_of_what_is_one_change_sum_to_the_same_whole():
     assert joined[NAME_OF["weightless"]] == pytest.approx(5.0)
     assert joined["origin and recoil"] == pytest.approx(3.0)
     assert plateau.groupings["two layers"] == {
-        "algebra of Eq. 9": pytest.approx(0.0),
+        "formulas of the program": pytest.approx(0.0),
         "physics of Eq. 8": pytest.approx(8.0),
     }

@@ -16,7 +16,7 @@ NAMES: Final[Mapping[str, str]] = {
     "origin": "origin at rest, drag on the tube",
     "recoil": "no recoil in impacts",
 }
-"""Switch -> the assumption it mends, in the order of the ladder."""
+"""Switch -> the assumption it changes, in the order of the ladder."""
 
 
 def canonical(switches: Switches) -> Switches:

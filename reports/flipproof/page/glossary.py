@@ -20,6 +20,7 @@ TERMS: Final[Mapping[str, str]] = {
     "γ": "Damping rate α/2m: how fast drag slows a slice that slides along the bottle.",
     "α": "Drag coefficient of one slice, in kg/s: the force of drag is α times its speed.",
     "C_M": "Centre of mass of bottle and water together.",
+    "r_c": "Distance from the cap of the centre of the bottle with the slices that rest on its ends; M_c: their mass.",
     "r_CM": "Distance of the centre of mass from the cap, along the axis of the bottle.",
     "v_CM": "Speed of the centre of mass along the axis of the bottle, as seen from the bottle.",
     "N": "Number of slices that the water is cut into.",
@@ -54,7 +55,7 @@ TERMS: Final[Mapping[str, str]] = {
     "mujoco": "A physics engine for robotics: motion in joint coordinates; here the law and the times of impact "
     "are ours.",
     "engine": "A program by others that moves bodies by the laws of mechanics and knows nothing of Eq. 8 or of "
-    "our equations.",
+    "our equations; MuJoCo is given our law and times of impact.",
     "fair share": "What a change does to a result, as the mean over all orders in which all the changes can be "
     "made; the fair shares sum to the whole.",
     "band": "An estimate, not a bound, of how far a number could move by numerical causes alone: from eight flights "

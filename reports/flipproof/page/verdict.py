@@ -295,6 +295,7 @@ SHARES: Final[Mapping[str, str]] = {
     "second_free": "findings/reference-free-flight/value",
     "exact": "findings/exact-cases-free-flight/value",
     "weight": "differences/gravity in Eq. 8/largest",
+    "drag": "differences/drag against C_M/largest",
     "origin": "differences/origin at rest, drag on the tube/largest",
     "recoil": "differences/no recoil in impacts/largest",
 }
@@ -366,7 +367,11 @@ def _layers(summary: Summary, numbers: Mapping[str, Number | None]) -> list[Simp
     steps = summary.at("headlines/step/note") or "the steps"
     questions = {
         "step": ("The time step", "steps", f"Are {steps} enough?"),
-        "program-eq8": ("The algebra of Eq. 9", "errata", "Do the program’s formulas, Eq. 9, solve Eq. 8?"),
+        "program-eq8": (
+            "The formulas of the program",
+            "errata",
+            "Do the program’s formulas, meant to be Eq. 9, solve Eq. 8?",
+        ),
         "eq8-free": (
             "The physics of Eq. 8",
             "assumptions",

@@ -85,7 +85,8 @@ class Alignment:
         words += f", {len(first)} are in the first flight alone, {len(second)} in the second alone"
         if len(lone := np.concatenate([first.first, second.second])):
             words += f", the earliest of these at {lone.min() * 1e3:.1f} ms"
-        return f"{words}; impacts slower than {MIN_SPEED:g} m/s are not compared"
+        left_out = f"impacts slower than {MIN_SPEED:g} m/s, and lone ones slower than twice that or near the end,"
+        return f"{words}; {left_out} are not compared"
 
 
 def study_alignment(first: Trajectory, second: Trajectory) -> Alignment:
@@ -150,11 +151,11 @@ def study_tube(reference: Trajectory, run: Trajectory) -> tuple[Held, str]:
     """Hold the omega of a run against the tube around that of the reference, and say in words what became of it."""
     dt, dy = TUBE[0], TUBE[1] * abs(reference.scenario.omega0)
     held = hold(reference.t, reference.omega, run.t, run.omega, dt=dt, dy=dy)
-    tube = f"the tube of ±{dt * 1e3:g} ms and ±{dy:.3g} around {reference.label} in omega"
+    tube = f"the tube of ±{dt * 1e3:g} ms and ±{dy:.3g} rad/s around {reference.label} in omega"
     if held.first_exit is None:
         return held, f"{run.label} stays in {tube}"
     words = f"{run.label} leaves {tube} at {held.first_exit * 1e3:.1f} ms, "
-    words += f"is inside for {held.share:.1%} of the time and at most {held.largest:.3g} outside"
+    words += f"is inside for {held.share:.1%} of the time and at most {held.largest:.3g} rad/s outside"
     return held, words + (f"; it ends at {run.t[-1] * 1e3:.1f} ms" if run.t[-1] < reference.t[-1] else "")
 
 

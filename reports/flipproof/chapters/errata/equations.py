@@ -215,7 +215,8 @@ def erratum_gravity(throw: Scenario) -> Erratum:
         prints="m g cos θ in the frame of C_M",
         follows="C_M falls with g, so that weight and inertial force cancel",
         number=Number(change["eq8"], "of ω₀ changed by g", (0.0, 1e-9)),
-        note=f"free flight: {change['free-flight']:.1g}; largest change of ω in the first {early.duration:g} s",
+        note=f"free flight: {change['free-flight']:.1g}; largest change of ω in the first {early.duration:g} s, "
+        f"N = {early.n_slices}",
     )
 
 

@@ -63,7 +63,7 @@ def figures(visits: Sequence[Visit]) -> Iterator[Exhibit]:
                 caption="Left: from the guest's mean of ω/ω₀ over the second half to that of free flight. The bar “the "
                 "rest” leads to the equation that the guest solves; no assumption explains it; its error bar is the "
                 "guest's own band. Every other bar is the fair share of an assumption of that equation, the mean over "
-                "all orders of mending them. Right: the same in single orders; where the marks lie apart, assumptions "
+                "all orders of changing them. Right: the same in single orders; where the marks lie apart, assumptions "
                 "interact. Below the dotted line: what forbidding overlap changes, no share.",
                 alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
                 f"{waterfall.end:.3f} by {bars}.",

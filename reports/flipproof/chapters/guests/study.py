@@ -10,7 +10,7 @@ The difference to free flight is split over the assumptions that its equation st
     plateau of free flight - plateau of the guest = rest + sum of fair shares
 
 The rest is the plateau of the guest's equation minus that of the guest: its own error, and what is no assumption of the
-ladder. A fair share is the mean over all orders of mending the assumptions (``chapters.waterfall``).
+ladder. A fair share is the mean over all orders of changing the assumptions (``chapters.waterfall``).
 """
 
 from __future__ import annotations

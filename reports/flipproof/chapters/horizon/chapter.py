@@ -272,7 +272,8 @@ def figure_horizon(studies: Sequence[Horizon]) -> Figure:
         axes.set_yscale("log")
         axes.margins(x=0.01)
         _draw_widths(axes, study, lines, solver_style(study.solver)["color"])
-        axes.set_title(study.name, fontsize=10, loc="left")
+        slices = study.ensembles[0][0].runs[0].scenario.n_slices
+        axes.set_title(f"{study.name}, N = {slices}", fontsize=10, loc="left")
     top = [
         ensemble.width[np.isfinite(ensemble.width)].max(initial=BAND) for s in studies for _, ensemble in s.ensembles
     ]

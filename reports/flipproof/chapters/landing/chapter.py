@@ -21,7 +21,7 @@ from flipproof.chapters.landing.study import (
     counting,
     read,
 )
-from flipproof.chapters.landing.throws import Case, make_cases
+from flipproof.chapters.landing.throws import FAMILIES, Case, make_cases
 from flipproof.chapters.landing.work import Landed
 from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
 from flipproof.frame.findings import Band, Finding, observed, regression
@@ -73,12 +73,17 @@ def _water_and_ice(results: LandingStudy) -> Iterator[Finding]:
         ice = results.cell("ice", filling)
         if ice is None:
             continue
-        difference, low, high = water.minus(ice)
-        cells = {KINDS[kind].words: results.cell(kind, filling) for kind in WATER[1:]}
-        laws = ", ".join(f"{law} {cell.share.value:.3f}" for law, cell in cells.items() if cell is not None)
-        verdict = _interval(low, high, ("water stands more often", "ice stands more often", "undistinguished"))
+        by_law = {KINDS[kind].words: cell.minus(ice) for kind in WATER if (cell := results.cell(kind, filling))}
+        if min(low for _, low, _ in by_law.values()) > 0:
+            verdict = "by both laws water stands more often"
+        elif max(high for *_, high in by_law.values()) < 0:
+            verdict = "by both laws ice stands more often"
+        else:
+            verdict = "undecided by one law, or not alike by both"
+        laws = "; ".join(f"{law}, {d:+.3f} ({low:+.3f} to {high:+.3f})" for law, (d, low, high) in by_law.items())
         title = f"P(upright), water minus ice, at filling {filling:g} (abstract, section 3: redistribution helps)"
-        note = f"{verdict}; law together; {laws}; {results.assumed}"
+        note = f"{verdict}; with 95 % intervals: {laws}; the number is of the first; {results.assumed}"
+        difference, low, high = water.minus(ice)
         band = Band((high - low) / 2, "sample")
         yield observed(f"landing-water-minus-ice-{filling:g}", title, difference, "", note, band=band)
 
@@ -111,7 +116,7 @@ def _static(results: LandingStudy) -> Iterator[Finding]:
     for (family, kind), (below, above) in results.static.items():
         if throws := below.throws + above.throws:
             id_ = f"landing-static-{family}-{kind.replace(', ', '-')}"
-            words = f"{title}{KINDS[kind].words}, family {family}"
+            words = f"{title}{KINDS[kind].words}, {FAMILIES[family]}"
             note = f"of those with a tilt below it {below.upright} of {below.throws} stand, of those above it "
             note += f"{above.upright} of {above.throws}; {results.assumed}"
             yield observed(id_, words, (below.upright + above.throws - above.upright) / throws, note=note)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.landing.study import AXIS_KINDS, KINDS, OPTIMAL, Cell, Kind, LandingStudy
+from flipproof.chapters.landing.study import AXES, AXIS_KINDS, KINDS, OPTIMAL, Cell, Kind, LandingStudy
 from flipproof.chapters.landing.throws import FAMILIES
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.columns import rows_csv
@@ -34,7 +34,7 @@ SHADES: Final = {
 def figures(results: LandingStudy) -> list[Exhibit]:
     """Return every figure of the subject."""
     size = results.size
-    missed = "In family A ice that does not reach the table from above counts as not upright. "
+    missed = f"With {FAMILIES['A']}, ice that does not reach the table from above counts as not upright. "
 
     def exhibit(name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], table: str) -> Exhibit:
         caption = f"{caption} {results.assumed.capitalize()}."
@@ -50,7 +50,7 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             f"that the paper calls optimal. {missed if 'A' in size.families else ''}".rstrip(),
             " ".join(share_line(results, family).replace("\n ", " ") + "." for family in size.families),
             figure_shares,
-            shares_csv(results),
+            shares_csv(results, ("filling",)),
         ),
         exhibit(
             "landing-map",
@@ -76,7 +76,7 @@ def figures(results: LandingStudy) -> list[Exhibit]:
                 for axis in ("restitution", "friction", "scatter")
             ),
             figure_axes,
-            shares_csv(results),
+            shares_csv(results, tuple(AXES)),
         ),
     ]
 
@@ -89,7 +89,7 @@ def figure_shares(results: LandingStudy) -> Figure:
         for kind in LOOKS:
             _curve(axes, kind, results.along("filling", kind, family))
         axes.axvspan(*OPTIMAL, color="#0072B2", alpha=0.06, linewidth=0)
-        axes.set_title(f"{family}: {FAMILIES[family]}", fontsize=10, loc="left")
+        axes.set_title(FAMILIES[family], fontsize=10, loc="left")
         axes.set(xlabel="fill fraction M_w / M_max [1]", ylim=(0.0, 1.0))
     panels[0, 0].set_ylabel("P(upright) [1]")
     shared_legend(figure, panels[0, -1], columns=5)
@@ -106,7 +106,7 @@ def figure_axes(results: LandingStudy) -> Figure:
             _curve(axes, kind, results.along(axis, kind))
         axes.set(xlabel=label, ylim=(0.0, 1.0))
     panels[0].set_ylabel("P(upright) [1]")
-    title = f"filling {results.size.axis_filling:g}, family {results.size.families[-1]}"
+    title = f"filling {results.size.axis_filling:g}, {FAMILIES[results.size.families[-1]]}"
     panels[0].set_title(title, fontsize=10, loc="left")
     shared_legend(figure, panels[0])
     return figure
@@ -152,8 +152,8 @@ def figure_map(results: LandingStudy) -> Figure:
     return figure
 
 
-def shares_csv(results: LandingStudy) -> str:
-    """Return one row for each share: what was thrown, the share with its 95 % interval, and means at the touch."""
+def shares_csv(results: LandingStudy, axes: Sequence[str] = ("filling", *AXES)) -> str:
+    """Return one row for each share along these axes: what was thrown, its 95 % interval, and means at the touch."""
     rows = [
         [
             key.axis, key.value, key.family, key.filling, KINDS[key.kind].words, cell.share.upright,
@@ -161,6 +161,7 @@ def shares_csv(results: LandingStudy) -> str:
             cell.aim.throw.omega0, cell.aim.height, cell.aim.time, *cell.touch, cell.bounces,
         ]
         for key, cell in results.cells.items()
+        if key.axis in axes
     ]  # fmt: skip
     names = (
         "axis", "value", "family", "fill_fraction [1]", "landed", "upright", "undecided", "missed", "throws",
@@ -186,7 +187,7 @@ def map_csv(results: LandingStudy) -> str:
 
 def share_line(results: LandingStudy, family: str) -> str:
     """Return the shares of one family as lines."""
-    lines = [f"P(upright), family {family}, 95 % intervals:"]
+    lines = [f"P(upright), {FAMILIES[family]}, 95 % intervals:"]
     for kind, landing in KINDS.items():
         words = []
         for fill, cell in results.along("filling", kind, family):
@@ -207,5 +208,5 @@ def page(results: LandingStudy) -> dict[str, object]:
         curves = {landing.words: dict(results.along("filling", kind, family)) for kind, landing in KINDS.items()}
         fills = sorted({fill for curve in curves.values() for fill in curve})
         rows = [(name, [curve.get(fill) for fill in fills]) for name, curve in curves.items() if curve]
-        shares.append((f"family {family}: {FAMILIES[family]}", fills, rows))
+        shares.append((FAMILIES[family], fills, rows))
     return {"shares": shares, "unaimed": sorted(set(results.unaimed.values()))}

@@ -98,7 +98,7 @@ def figures(maps: Maps) -> Iterator[Exhibit]:
 
 def _exhibit(study: ValidityMap) -> Exhibit:
     dominant = study.dominant
-    which = "fair share (mean over all orders of mending)"
+    which = "fair share (mean over all orders of changing)"
     shade, contours = (
         ("the step error of the published program", "a scheme is 1 % and 10 % of ω₀ off its own equation")
         if study.axis == "step"

@@ -4,7 +4,7 @@ The mapped error is the difference of the plateau, the mean of omega / omega_0 o
 what the paper reads off a flight, and an average forgives a rebound that comes a little early. The largest difference
 max |d omega| / omega_0 is kept beside it; a single impact that shifts in time saturates it.
 
-An assumption's number on a map is its fair share, the mean over all orders of mending (``frame.shapley``): every
+An assumption's number on a map is its fair share, the mean over all orders of changing (``frame.shapley``): every
 combination of assumptions is flown in every cell.
 """
 

@@ -149,7 +149,9 @@ def claim_column(study: Overlap) -> Finding:
     cost = study.cost_to_column
     computed = np.flatnonzero(np.isfinite(cost)).tolist()
     words = ", ".join(f"{cost[k]:+.3f} at {study.fills[k]:.0%}" for k in computed)
-    title = "plateau of ω/ω₀ of free flight, whose slices overlap, minus that of a column: the largest over fillings"
+    title = (
+        "plateau of ω/ω₀ of free flight, whose slices overlap, minus that of a column: largest in size over fillings"
+    )
     note = (
         f"a difference of two models, no share; free flight at N = {study.throw.n_slices}, the column has no slices; "
     )
@@ -174,7 +176,8 @@ def figures(result: OverlapResult) -> Iterator[Exhibit]:
     cost, max_note = study.cost_to_column, ""
     if np.isfinite(cost).any():
         k = int(np.nanargmax(np.abs(cost)))
-        max_note = f"; at most {cost[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %".replace("-", "−")
+        idle = ", where the column does not start" if study.level[COLUMN][k] > 0.999 * ICE else ""
+        max_note = f"; largest in size {cost[k]:+.3f}, at filling {100 * study.fills[k]:.0f} %{idle}".replace("-", "−")
     yield Exhibit(
         name="overlap",
         title="How far ω falls because slices may overlap",

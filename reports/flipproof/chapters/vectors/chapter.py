@@ -33,7 +33,8 @@ def claim_vectors(vector: Vector, flight: Trajectory) -> Finding:
     admissible = {"published-python": (0.0, 1e-10), "published-matlab": (0.0, 1e-8)}
     worst = max(error, key=lambda column: math.inf if math.isnan(error[column]) else error[column])
     title = f"{vector.scheme} reproduces the output of the paper's program, {vector.name}"
-    note = f"largest in column {worst}, over {len(error)} columns"
+    until = f", up to {vector.until:g} s" if vector.until < vector.scenario.duration else ""
+    note = f"largest in column {worst}, over {len(error)} columns{until}"
     return regression(f"vectors-{vector.name}", title, float(error[worst]), "relative", admissible[vector.scheme], note)
 
 

@@ -83,9 +83,9 @@ def figures(waterfalls: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
     yield Exhibit(
         name="waterfall",
         title="From the published program to free flight",
-        caption=f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one assumption, the mean over "
-        "all orders in which six can be mended after the finite step; blue raises, orange lowers. Right: the same "
-        "assumption in single orders. Where the marks lie apart the assumptions interact, and the bar of one order is "
+        caption=f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one change, the mean over "
+        "all orders in which six can be made after the finite step; blue raises, orange lowers. Right: the same "
+        "change in single orders. Where the marks lie apart the assumptions interact, and the bar of one order is "
         "not a share. "
         "Error bars are numerical. Below the dotted line, hatched: what forbidding overlap changes, from free flight, "
         "whose slices overlap, to rods of water, which cannot. That is a difference of two models and no share.",
@@ -102,7 +102,7 @@ def bars_csv(waterfall: Waterfall) -> str:
     """Return every bar in three orders, between the two ends."""
     unit = waterfall.observable.unit
     return rows_csv(
-        ("assumption mended", f"in the order of the ladder [{unit}]", f"its band [{unit}]", f"in reverse [{unit}]",
+        ("assumption changed", f"in the order of the ladder [{unit}]", f"its band [{unit}]", f"in reverse [{unit}]",
          f"mean of all orders [{unit}]", f"band of the mean [{unit}]", f"least of all orders [{unit}]",
          f"largest of all orders [{unit}]"),
         (

@@ -36,7 +36,7 @@ GROUPINGS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         "origin and recoil": ("origin", "recoil"),
     },
     "two layers": {
-        "algebra of Eq. 9": ("signs", "roots", "drag_on_centre"),
+        "formulas of the program": ("signs", "roots", "drag_on_centre"),
         "physics of Eq. 8": ("weightless", "origin", "recoil"),
     },
 }
