@@ -178,7 +178,10 @@ def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureG
     where, advice = _describe(equation, intervals, departs)
     if ignored and not advice:
         advice = f"another {traits.refined_by} changes nothing: look at how ask.effort is used"
-    return where, advice or "no term explains it: look at iterations that end early, and at tolerances of its own"
+    return where, advice or (
+        "no term explains it: look at what is held constant within a step, at coefficients of the method, at iterations "
+        "that end early, and at tolerances of its own"
+    )
 
 
 def _intervals_at(
