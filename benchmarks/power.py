@@ -29,7 +29,7 @@ from flipproof.foreign.contract import Answer, Ask, ForeignError
 BLIND: Final = (
     "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh",
     "twelfth", "thirteenth", "fourteenth", "fifteenth", "sixteenth", "seventeenth", "eighteenth", "nineteenth",
-    "twentieth",
+    "twentieth", "twentyfirst",
 )  # fmt: skip
 """Lists by people who had not seen the checks."""
 

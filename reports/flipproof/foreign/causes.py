@@ -314,6 +314,10 @@ def _undisturbed(intervals: Sequence[Interval]) -> list[Interval]:
     return [i for i in intervals if not i.hits and np.array_equal(i.before, i.after)]
 
 
+DRAG_OF_EQ8: Final = "the drag, alpha (v - v_CM) / m"
+DRAG_OF_FREE_FLIGHT: Final = "the drag, alpha v / m + alpha sum(v) / M_c"
+"""Terms that are all of an equation's drag."""
+
 WEIGHT_OF_ITS_OWN: Final = "cos(theta), in m/s^2,"
 """Term of a throw without gravity."""
 
@@ -343,6 +347,9 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
             "omega^2 L": omega**2 * throw.bottle.length * ones,
             "g cos(theta)": throw.gravity * np.cos(theta) * ones,
             "g sin(theta)": throw.gravity * np.sin(theta) * ones,
+            DRAG_OF_EQ8: drag * (v[free] - share * v.mean()),
+            DRAG_OF_FREE_FLIGHT: drag * v[free]
+            + throw.drag * v[free].sum() / (throw.bottle.mass + throw.slice_mass * np.sum(~free)),
             "the drag alpha v / m": drag * v[free],
             "the drag alpha v_CM / m": drag * share * v.mean() * ones,
             "the drag alpha mean(v) / m": drag * v.mean() * ones,
@@ -371,6 +378,8 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
         if best is not None and best[0] < 0.03:
             if best[1] == ("the drag alpha mean(v) / m",) and abs(best[2][0] - (1.0 - share)) < 0.02:
                 return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
+            if best[1][0] in (DRAG_OF_EQ8, DRAG_OF_FREE_FLIGHT) and count == 1:
+                return f"{best[1][0]}, counts {1.0 - best[2][0]:.2g} times: look at alpha / m, twice the damping rate"
             if best[1] == (WEIGHT_OF_ITS_OWN,) and best[2][0] > 0.0:
                 return f"slices weigh as if g were {best[2][0]:.3g} m/s^2 where it is 0: take gravity from the throw"
             parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))

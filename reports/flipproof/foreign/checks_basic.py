@@ -491,12 +491,27 @@ def check_definitions(traits: Traits) -> CheckGenerator:
         hint += _parts_advice(answer.r, values)
     elif np.max(np.abs(values + derived["r_cm"] - scale["r_cm"])) < bound * scale["r_cm"]:
         hint += "r_cm is L minus the right one: measure it from the cap; "
+    elif not hint and answer.t[0] == 0.0 and errors["r_cm"][0] <= bound and np.ptp(values) > bound * scale["r_cm"]:
+        hint = _drift_advice(answer, int(np.argmax(errors["r_cm"] > bound)))
     return Observation(
         holds=float(errors[worst].max()) <= bound,
         expected=f"within {bound:.1g} of those that follow from r",
         observed=f"{worst} off by {errors[worst].max():.2g}",
         where=time_of_max(answer.t, errors[worst]),
         advice=hint.removesuffix("; ") or DEFINED[worst],
+    )
+
+
+def _drift_advice(answer: Answer, first: int) -> str:
+    """Return what may drive r_cm off the centre of mass from output ``first`` on: impacts, or smooth forces."""
+    assert answer.r is not None
+    at_end = (answer.r < THROW.r_min + 1e-3 * THROW.slice_height) | (answer.r > THROW.r_max - 1e-3 * THROW.slice_height)
+    look_at = "the reaction of the drag, at inertial forces, and at the launch velocity"
+    if (at_end & ~at_end[0])[: first + 2].any():
+        look_at = "the recoil, and at what a slice that comes to rest does to the bottle"
+    return (
+        f"r_cm is right at release and not from t = {answer.t[first]:.2g} s on: if it follows from the motion, bottle "
+        f"and water are not moved by opposite forces: look at {look_at}"
     )
 
 

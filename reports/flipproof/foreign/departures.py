@@ -179,8 +179,8 @@ def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureG
     if ignored and not advice:
         advice = f"another {traits.refined_by} changes nothing: look at how ask.effort is used"
     return where, advice or (
-        "no term explains it: look at what is held constant within a step, at coefficients of the method, at iterations "
-        "that end early, and at tolerances of its own"
+        "no term explains it: look at what is held constant within a step, at coefficients of the method, "
+        "at iterations that end early, and at tolerances of its own"
     )
 
 
