@@ -61,7 +61,7 @@ No step is a multiple of another, so that no two share output times by chance.
 """
 
 FINER: Final = tuple(level + 2 for level in LEVELS[-1])
-"""Levels at which the errors of a weak solver are confirmed, with a quarter of the finest steps."""
+"""Levels at which the errors of a weak solver, or one of order 1, are confirmed: a quarter of the finest steps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -564,14 +564,14 @@ def confirmed(
     """Return the comparison of a wrong throw at the finest levels.
 
     A step that something else limits, such as an output time or a longest step, is the same at all coarse levels: its
-    error does not show there as a change. Where impacts wait for the grid, large errors fall by leaps, and three
-    levels may agree by chance: a solver whose own error is still ``WEAK`` is asked at ``FINER`` ones, and compared
-    there if it answers.
+    error does not show there as a change. Where impacts wait for the grid, or the order is 1, errors fall by leaps, and
+    three levels may agree by chance: a solver of order 1, or whose own error is still ``WEAK``, is asked at ``FINER``
+    ones, and compared there if it answers.
     """
     if traits.refined_by is None or knobs.frozen or comparison.error:
         return comparison
     (comparison,) = yield from comparing(traits, [knobs], seed, equation, unrefined, LEVELS[-1:])
-    if comparison.wrong and comparison.own_error >= WEAK:
+    if comparison.wrong and (comparison.own_error >= WEAK or (traits.order or math.inf) <= 1.0):
         (finer,) = yield from comparing(traits, [knobs], seed, equation, unrefined, [FINER])
         return comparison if finer.error else finer
     return comparison

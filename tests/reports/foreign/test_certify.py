@@ -352,10 +352,15 @@ def judged(kind, knobs):
     return solver, found
 
 
-def test_errors_that_fall_by_leaps_are_confirmed_at_finer_steps():
-    """Impacts that wait for the grid: three levels agree by chance, and are wrong by more than they differ."""
-    solver = InProcess(LISTS["right"]["frozen_grid"].solver(), "x")
-    knobs = next(k for k in drawn(SEED) if (k.slices, k.restitution, k.damping, k.frozen) == (2, 0.0, 0.0, False))
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("frozen_grid", {"slices": 2, "restitution": 0.0, "damping": 0.0}), ("euler_located", {"slices": 17})],
+)
+def test_errors_that_fall_by_leaps_are_confirmed_at_finer_steps(name, words):
+    """Impacts that wait for the grid, or order 1: three levels agree by chance, farther off than they differ."""
+    solver = InProcess(LISTS["right"][name].solver(), "x")
+    words |= {"frozen": False}
+    knobs = next(k for k in drawn(SEED) if all(getattr(k, key) == value for key, value in words.items()))
     (found,) = drive(comparing(solver.traits, [knobs], SEED, "eq8", 0.01), solver)
     assert found.excess > 1.0
     assert not drive(confirmed(solver.traits, knobs, found, SEED, "eq8", 0.01), solver).wrong
