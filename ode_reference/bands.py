@@ -39,11 +39,13 @@ class Band:
     t : (P,) - output times of the flight [s]
     size : (P,) - band, fraction of |omega_0|; it never falls, and is infinite where another flight has ended
     flights : int - how many flights the flight was compared with
+    cause : str - which of them is the farthest at the end, in words
     """
 
     t: FloatArray
     size: FloatArray
     flights: int
+    cause: str = ""
 
     @property
     def largest(self) -> float:
@@ -103,12 +105,16 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
         pass
     speed, how = settings["rest_speed"], {"impact_law": settings["impact_law"], **method_settings}
     variants = [{"twin": k, "rest_speed": speed} for k in range(1, twins + 1)]
+    causes = ["a twin, whose release differs in the eleventh digit,"] * twins
     variants.append({"rest_speed": max(speed / CUT, MIN_REST_SPEED)})
+    causes.append(f"a rest speed {CUT:g} times smaller")
     if method_settings["method"] != settings["method"]:
         variants.append({"rest_speed": speed})
+        causes.append(f"method {method_settings['method']!r}")
     omega = np.full((len(variants), len(flight.t)), np.inf)
     for row, variant in zip(omega, variants, strict=True):
         varied = solve(flight.scenario, settings["model"], flight.t, **how, **variant).omega
         row[: len(varied)] = varied
-    size = band_of(flight.omega, omega) / abs(flight.scenario.omega0)
-    return Band(flight.t, np.maximum.accumulate(size), len(variants))
+    size = np.maximum.accumulate(band_of(flight.omega, omega) / abs(flight.scenario.omega0))
+    farthest = int(np.argmax(np.max(np.abs(omega - flight.omega), axis=1)))
+    return Band(flight.t, size, len(variants), causes[farthest])

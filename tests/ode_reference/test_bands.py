@@ -106,6 +106,19 @@ def test_a_long_flight_says_up_to_when_it_may_be_trusted(settings):
     assert np.all(np.abs(exact.omega - flight.omega) <= band.size * abs(CHAOTIC.omega0))
 
 
+def test_a_band_says_what_makes_it():
+    """What a rest speed changes is not laid at the door of twins that change nothing."""
+    bottle = Bottle(length=0.2, radius=0.03, mass=0.05, capacity=0.5)
+    some = {"water_mass": 0.2, "n_slices": 20, "drag": 0.002, "restitution": 0.3, "omega0": 14.0, "theta0": 1.0}
+    throws = (Scenario(bottle=bottle, duration=0.7, **some), CHAOTIC)
+    resting, chaotic = (estimate_band(ode_reference.solve(throw, "free-flight")) for throw in throws)
+    assert (resting.cause, chaotic.cause) == (
+        "a rest speed 10 times smaller",
+        "a twin, whose release differs in the eleventh digit,",
+    )
+    assert resting.largest > 1e-3
+
+
 def test_the_band_of_another_method_holds_the_error_of_its_steps():
     coarse = ode_reference.solve(THROW, "eq8", method="RK45", rtol=1e-4, atol=1e-4)
     exact = ode_reference.solve(THROW, "eq8")

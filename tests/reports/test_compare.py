@@ -55,10 +55,10 @@ def test_two_columns_are_enough(capsys, tmp_path, first, second, quantity, witho
     b = written(tmp_path / "b.csv", f"{second},t\n1,0\n2.5,1\n3,2\n")
     status, out, _ = flipproof(capsys, a, b)
     assert status == 0
-    size = "50.000% of omega_0" if quantity == "omega" else "0.5 rad"
+    size = "50% of omega_0" if quantity == "omega" else "0.5 rad"
     assert f"largest |difference in {quantity}|: {size} at t = 1 s" in out
     for name in without:
-        assert f"{name} is not compared: {a} and {b} has no values of it" in out
+        assert f"{name} is not compared: {a} and {b} have no values of it" in out
     assert "compared at 3 times that both have; nothing is interpolated" in out
 
 
@@ -145,3 +145,19 @@ def test_a_junit_file_that_could_say_nothing_is_refused(capsys):
     junit = ("compare", "eq8", "eq8", "--junit")
     refused(capsys, "--junit x.xml needs --tolerance", *junit, "x.xml")
     refused(capsys, "the folder nowhere does not exist", *junit, "nowhere/x.xml", "--tolerance", "1")
+
+
+def test_a_flight_that_stops_is_said_and_passes_nothing(capsys):
+    options = ("published-python", "published-matlab", "--slices", "50", "--tolerance", "0.5")
+    status, out, _ = flipproof(capsys, *options)
+    assert status == 1
+    assert re.search(r"published-matlab: overflow: .* its flight counts up to t = 0\.298\d s of 0\.5 s", out)
+    assert "compared until t = 0.298" in out
+    assert re.search(r"^FAIL .* not judged, tolerance 0\.5 \(published-matlab: overflow", out, re.MULTILINE)
+
+
+def test_releases_that_differ_are_said():
+    found = compare(curve("a", [0, 1, 2], omega=[10, 9, 8]), curve("b", [0, 1, 2], omega=[20, 19, 18]))
+    assert found.notes[-1] == (
+        "at t = 0 s omega is 10 and 20 rad/s; both are divided by 10 rad/s, the first value of a"
+    )

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 from landing_forms import Block
-from made_up import refused
+from made_up import command, refused
 from matplotlib.collections import QuadMesh
 
 from flipproof.build import ask_of, gather_report
@@ -571,3 +571,18 @@ def test_frozen_throws_are_not_counted_twice(tmp_path, capsys):
     file.write_text("[scenario]\nfrozen = true\n", encoding="utf-8")
     assert main(["upright", str(file), "--out", str(tmp_path / "x")]) == 2
     assert "scenario.frozen = true: the study throws water and ice beside it" in capsys.readouterr().err
+
+
+def test_a_throw_without_gravity_lands_nowhere(tmp_path, capsys):
+    throw = tmp_path / "throw.toml"
+    throw.write_text("[scenario]\ngravity = 0.0\n")
+    refused(capsys, "gravity = 0 m/s^2: nothing falls on a table", "upright", throw, "--out", tmp_path / "out")
+
+
+def test_a_landing_says_what_was_assumed_and_of_how_many_slices(tmp_path, capsys):
+    throw = tmp_path / "throw.toml"
+    throw.write_text("[scenario]\nn_slices = 2\ndrag = 0.5\n")
+    status, out, _ = command(capsys, "land", throw, "--friction", "0.1", "--law", "together")
+    assert status == 0
+    assert "friction 0.1 (restitution assumed: no measured value was found); water of 2 slices" in out
+    assert " mm along the table by then" in out

@@ -110,7 +110,7 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
         patch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(SerialExecutor()))
         status, out, _ = run(capsys, *options, "--out", killed)
         assert status == 0
-        assert f"; {there} were there\ncells by largest fair share: " in out
+        assert f"; {there} were there\ncells by largest fair share of omega/omega_0, " in out
         assert run(capsys, *options, "--out", tmp_path / "whole")[0] == 0
     assert stored(killed) == stored(tmp_path / "whole")
     for name in ("map.svg", "map.png", "map.csv", "map.json"):
@@ -154,10 +154,11 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
         assert float(row["plateau eq8"]) == study.level["eq8"][at]
         assert float(row["plateau rods"]) == study.level["rods"][at]
         assert float(row["fair share of gravity in Eq. 8"]) == study.shares[RUNGS.index("gravity in Eq. 8")][at]
-        assert row["largest fair share"] == RUNGS[study.dominant[at]]
+        assert row["largest fair share"] == ("" if study.dominant[at] < 0 else RUNGS[study.dominant[at]])
         assert row["reason"] == ""
     facts = json.loads(json.dumps(map_facts(study, THROW), allow_nan=False))
-    assert sum(facts["cells by largest fair share"].values()) == 9
+    assert sum(facts["cells by largest fair share"].values()) + facts["cells below 0.0001"] == 9
+    assert facts["cells below 0.0001"] == int((np.abs(study.shares).max(axis=0) < 1e-4).sum()) > 0
     assert [(contour["of"], contour["level"]) for contour in facts["contours"]] == [
         (of, level) for of in ("error of published-python", "change by overlap") for level in (0.01, 0.1)
     ]

@@ -87,8 +87,18 @@ def compare(first: Curve, second: Curve) -> Comparison:
     for name in QUANTITIES:
         without = [curve.label for curve in (first, second) if name not in curve.series]
         if without:
-            notes.append(f"{SYMBOLS[name]} is not compared: {' and '.join(without)} has no values of it")
+            have = "have" if len(without) > 1 else "has"
+            notes.append(f"{SYMBOLS[name]} is not compared: {' and '.join(without)} {have} no values of it")
     apart = tuple(_apart(name, first, second) for name in both)
+    notes += [
+        f"at t = {gap.t[0]:.4g} s omega is {gap.first[0]:.6g} and {gap.second[0]:.6g} rad/s; both are divided by "
+        f"{gap.scale:.6g} rad/s, the first value of {first.label}"
+        for gap in apart
+        if gap.quantity == "omega" and abs(gap.second[0] - gap.first[0]) > PARTING_BAND * abs(gap.scale)
+    ]
+    ends = sorted(float(curve.series[both[0]][0][-1]) for curve in (first, second))
+    if ends[0] < 0.99 * ends[1]:
+        notes.append(f"compared until t = {ends[0]:.4g} s, where one ends; the other goes on to {ends[1]:.4g} s")
     return Comparison(first=first.label, second=second.label, apart=apart, notes=tuple(notes))
 
 
@@ -118,7 +128,8 @@ def table(both: Comparison) -> str:
 
     def row(words: str, numbers: tuple[float, float]) -> None:
         a, b = numbers
-        lines.append(f"{words:34}{a:{width}.5f}  {b:{width}.5f}  {b - a:+.5f}")
+        a_text, b_text = (f"{x:.5f}" if abs(x) < 1e6 else f"{x:.6g}" for x in (a, b))
+        lines.append(f"{words:34}{a_text:>{width}}  {b_text:>{width}}  {(b - a) or 0.0:+.3g}")
 
     for gap in both.apart:
         row(f"{SYMBOLS[gap.quantity]}({gap.t[-1]:.4g} s) [{UNITS[gap.quantity]}]", (gap.first[-1], gap.second[-1]))
@@ -127,7 +138,7 @@ def table(both: Comparison) -> str:
             row("omega/omega_0, mean of second half", (a, b))
     for gap in both.apart:
         largest, time = gap.largest
-        size = f"{largest:.3%} of omega_0" if gap.quantity == "omega" else f"{largest:.3g} {UNITS[gap.quantity]}"
+        size = f"{100 * largest:.3g}% of omega_0" if gap.quantity == "omega" else f"{largest:.3g} {UNITS[gap.quantity]}"
         lines.append(f"largest |difference in {SYMBOLS[gap.quantity]}|: {size} at t = {time:.5g} s")
         if gap.quantity == "omega":
             parting = first_crossing(gap.t, gap.size, PARTING_BAND)
@@ -145,8 +156,11 @@ def _times(both: Comparison) -> str:
     return f"compared at {n} times of {both.first}; {both.second} is interpolated linearly at {interpolated} of them"
 
 
-def claims(comparison: Comparison, tolerance: float) -> tuple[Finding, ...]:
-    """Return the largest differences as findings: the first is held to a finite tolerance, the others are observed."""
+def claims(comparison: Comparison, tolerance: float, stopped: str = "") -> tuple[Finding, ...]:
+    """Return the largest differences as findings: the first is held to a finite tolerance, the others are observed.
+
+    The first fails if a flight was ``stopped``, in words why.
+    """
     findings: list[Finding] = []
     for k, gap in enumerate(comparison.apart):
         largest, time = gap.largest
@@ -154,7 +168,10 @@ def claims(comparison: Comparison, tolerance: float) -> tuple[Finding, ...]:
         unit = "of omega_0" if gap.quantity == "omega" else UNITS[gap.quantity]
         claim = f"compare-{gap.quantity.replace('_', '-')}", title, largest, unit
         note = f"at t = {time:.6g} s"
-        findings.append(
-            observed(*claim, note) if k or math.isinf(tolerance) else regression(*claim, (0.0, tolerance), note)
-        )
+        if k or math.isinf(tolerance):
+            findings.append(observed(*claim, note))
+        elif stopped:
+            findings.append(regression(*claim[:2], None, unit, (0.0, tolerance), stopped))
+        else:
+            findings.append(regression(*claim, (0.0, tolerance), note))
     return tuple(findings)

@@ -207,9 +207,11 @@ def command_line() -> str:
     return shlex.join(["flipproof", *sys.argv[1:]])
 
 
-def read_scenario(path: str | None, slices: int | None = None) -> Any:
-    """Return the throw of a file, or the paper's own, cut into ``slices`` if given."""
+def read_scenario(path: str | None, slices: int | None = None, most: int | None = None) -> Any:
+    """Return the throw of a file, or the paper's own, cut into ``slices`` if given, else into at most ``most``."""
     from slicemodel import Scenario
 
     scenario = Scenario() if path is None else Scenario.from_toml(path)
+    if slices is None and most is not None:
+        slices = min(most, scenario.n_slices)
     return scenario.with_slices(slices) if slices else scenario

@@ -228,18 +228,23 @@ def command_compare(options: argparse.Namespace) -> int:
         run, seconds = solve_timed(find(name).name, scenario)
         if len(run.t) < 2:
             raise ValueError(f"{name} has nothing to compare on this throw: {run.status}: {run.message}")
-        warning = doubt(run, seconds, TRUSTED if options.tolerance is None else options.tolerance)
-        return replace(Curve.of(run), notes=(warning,) if warning else ())
+        warnings = [doubt(run, seconds, TRUSTED if options.tolerance is None else options.tolerance)]
+        if not run.ok:
+            stopped.append(f"{name}: {run.status}: {run.message}")
+            warnings.append(f"{stopped[-1]}; its flight counts up to t = {run.t[-1]:.4g} s of {scenario.duration:g} s")
+        return replace(Curve.of(run), notes=tuple(filter(None, warnings)))
 
+    stopped: list[str] = []
     comparison = compare(load(options.first), load(options.second))
     print(inert(table(comparison)))
     allowed = math.inf if options.tolerance is None else options.tolerance
-    findings = claims(comparison, allowed)
+    findings = claims(comparison, allowed, "; ".join(stopped))
     write_json(options.json, {**comparison.to_mapping(), "findings": [finding.to_mapping() for finding in findings]})
     if options.tolerance is None:
         return 0
     write_junit(options.junit, findings, "flipproof compare")
     first = findings[0]
     status = "FAIL" if first.failed else "PASS"
-    print(f"{status}  {first.title}: {first.value:.6g} {first.unit}, tolerance {options.tolerance:g} ({first.note})")
+    size = "not judged" if first.value is None else f"{first.value:.6g} {first.unit}"
+    print(inert(f"{status}  {first.title}: {size}, tolerance {options.tolerance:g} ({first.note})", lines=False))
     return 1 if first.failed else 0

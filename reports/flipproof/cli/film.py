@@ -210,7 +210,7 @@ def command_export(options: argparse.Namespace) -> int:
         write_text(options.out, table)
     else:
         sys.stdout.write(table)
-    return 0
+    return 0 if run.ok else 1
 
 
 def _pair(text: str) -> tuple[float, float]:

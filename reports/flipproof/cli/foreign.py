@@ -59,7 +59,7 @@ def add_foreign(commands: Any) -> None:
     explain.add_argument("first", metavar="A", help=SPEC_HELP)
     explain.add_argument("second", metavar="B", help="the same")
     explain.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    explain.add_argument("--slices", type=count, default=10, metavar="N", help="slices of the throw (default 10)")
+    explain.add_argument("--slices", type=count, metavar="N", help="slices of the throw (default: at most 10)")
 
 
 def add_models(commands: Any) -> None:
@@ -170,11 +170,12 @@ def command_place(options: argparse.Namespace) -> int:
 
 
 def command_explain(options: argparse.Namespace) -> int:
-    """Print why two solvers differ."""
+    """Print why two solvers differ; return 1 if one of them is off the lattice."""
     from flipproof.foreign.place import explain
     from flipproof.foreign.solving import opened
 
-    throw = read_scenario(options.scenario, options.slices)
+    throw = read_scenario(options.scenario, options.slices, 10)
     with closing(opened(options.first)) as first, closing(opened(options.second)) as second:
-        print(inert(explain(first, second, throw).text))
-    return 0
+        found = explain(first, second, throw)
+    print(inert(found.text))
+    return 0 if found.first.on_lattice and found.second.on_lattice else 1

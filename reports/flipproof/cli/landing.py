@@ -53,7 +53,7 @@ def add_landing(commands: Any) -> None:
     _add_table(land)
     land.add_argument("--law", metavar="NAME", help="together or in-turn (default: both)")
     land.add_argument("--programs", default="ode_reference", metavar="A,B", help="ode_reference, mujoco (%(default)s)")
-    land.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
+    land.add_argument("--slices", type=count, metavar="N", help=f"slices (default: at most {SLICES})")
 
     upright = add_command(
         commands, "upright", "Count how many scattered throws land upright, or resume the count.", command_upright
@@ -87,7 +87,7 @@ def _add_table(command: argparse.ArgumentParser) -> None:
 
 def command_land(options: argparse.Namespace) -> int:
     """Throw one bottle on a table and say how it lands."""
-    throw = read_scenario(options.scenario, options.slices)
+    throw = read_scenario(options.scenario, options.slices, SLICES)
     from flipproof.chapters.landing.single import describe, land_throw
     from flipproof.chapters.landing.study import standing
     from flipproof.chapters.landing.throws import aimed
@@ -121,6 +121,8 @@ def command_upright(options: argparse.Namespace) -> int:
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
     families = tuple(dict.fromkeys(name.strip() for name in options.families.split(",")))
     refuse_unknown("--families", families, FAMILIES)
+    if throw.gravity == 0.0:
+        raise ValueError("gravity = 0 m/s^2: nothing falls on a table")
     if throw.frozen:
         raise ValueError("scenario.frozen = true: the study throws water and ice beside it; leave it out")
     size = Size(

@@ -36,7 +36,7 @@ def add_sweeps(commands: Any) -> None:
     drawn.add_argument(
         "--size", type=size, default=(20, 20), metavar="CxR", help="fill fractions by values of the axis (20x20)"
     )
-    drawn.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices of every throw (%(default)s)")
+    drawn.add_argument("--slices", type=count, metavar="N", help=f"slices of every throw (at most {SLICES})")
     add_store(drawn)
 
     waterfall = add_command(
@@ -44,7 +44,7 @@ def add_sweeps(commands: Any) -> None:
         command_waterfall,
     )  # fmt: skip
     waterfall.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    waterfall.add_argument("--slices", type=count, default=SLICES, metavar="N", help="slices (%(default)s)")
+    waterfall.add_argument("--slices", type=count, metavar="N", help=f"slices (default: at most {SLICES})")
     add_store(waterfall)
 
 
@@ -57,7 +57,7 @@ def command_sweep(options: argparse.Namespace) -> int:
 
 def command_map(options: argparse.Namespace) -> int:
     """Make the runs of a map that have no row yet, and draw it."""
-    throw = read_scenario(options.scenario, options.slices)
+    throw = read_scenario(options.scenario, options.slices, SLICES)
     from flipproof.presets.planned import MapPlan, make_map
 
     plan = MapPlan.of_size(throw, options.axis, *options.size)
@@ -66,7 +66,7 @@ def command_map(options: argparse.Namespace) -> int:
 
 def command_waterfall(options: argparse.Namespace) -> int:
     """Make the runs of a waterfall that have no row yet, and draw it."""
-    throw = read_scenario(options.scenario, options.slices)
+    throw = read_scenario(options.scenario, options.slices, SLICES)
     from flipproof.presets.planned import make_split
 
     return fill(options, lambda begin, where: make_split(throw, options.out, begin, **where))

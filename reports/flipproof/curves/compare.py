@@ -190,7 +190,10 @@ class Comparison:
                 note = "no time can be compared: the band is wider than half the tolerance"
                 findings.append(regression(id_, title, None, "", (0.0, column.tolerance), note))
                 continue
-            note = f"at t = {column.gap.t[k]:.6g}, {int(column.comparable.sum())} of {len(column.gap.t)} times compared"
+            count = int(column.comparable.sum())
+            note = f"at t = {column.gap.t[k]:.6g}, {count} of {len(column.gap.t)} times compared"
+            if count < len(column.gap.t):
+                note += ", those at which bands and interpolation leave half of the tolerance"
             value, allowed = float(column.gap.size[k]), float(column.allowed[k])
             band = Band(float(column.band[k] + column.gap.error[k]), "twins")
             findings.append(regression(id_, title, value, "", (0.0, allowed), note, band=band))

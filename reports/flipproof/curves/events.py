@@ -79,7 +79,8 @@ class Matched(NamedTuple):
             return []
         text = f"events: {len(self.pairs)} in both"
         if len(self.pairs):
-            text += f", at most {np.abs(self.shift).max():.3g} apart"
+            shift = float(np.abs(self.shift).max())
+            text += f", at most {shift:.3g} apart" if shift else ", at the same times as far as these are given"
         counts = [int((self.lone[:, 1] == run).sum()) for run in (0, 1)]
         lines = [f"{text}; {counts[0]} in the first alone, {counts[1]} in the second alone"]
         if parted is None:

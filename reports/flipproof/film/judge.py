@@ -208,9 +208,10 @@ class Assessment:
             if not held.scale and not low - SCALE_ERROR * GRAVITY <= GRAVITY <= high + SCALE_ERROR * GRAVITY:
                 gravity = estimate.best["g"]
                 raise UnsoundError(
-                    f"{film.label}: g = {gravity:.3g} m/s^2 in the picture, not {GRAVITY:g}: click the calibration "
-                    f"stick again (lengths {gravity / GRAVITY:.3g} times too long), or name the frame rate of the "
-                    f"recording (times {math.sqrt(GRAVITY / max(gravity, 1e-9)):.3g} times too long); y points up"
+                    f"{film.label}: g = {gravity:.3g} m/s^2 in the picture, not {GRAVITY:g}: is the bottle that of "
+                    f"--scenario ({estimate.throw.fill_fraction:.0%} full)? click the calibration stick again (lengths "
+                    f"{gravity / GRAVITY:.3g} times too long), or name the frame rate of the recording "
+                    f"(times {math.sqrt(GRAVITY / max(gravity, 1e-9)):.3g} times too long); y points up"
                 )
             if self.noise > 0.1 * estimate.best["length"]:
                 raise UnsoundError(
@@ -244,8 +245,9 @@ class Assessment:
         if hand is not None and hand.falls:
             raise UnsoundError(
                 f"{estimate.film.label}: {1e3 * hand.seconds:.0f} ms before the release at {release:.3f} s the bottle "
-                "falls freely by its clicks alone: the flight begins earlier, and no fit was found that says so: click "
-                "the frames there again, or give --release"
+                "falls freely by its clicks alone: the flight begins earlier, and no fit was found that says so: is it "
+                f"the bottle of --scenario ({estimate.throw.fill_fraction:.0%} full)? click the frames there again, or "
+                "give --release"
             )
 
     def _check_rates(self) -> None:
@@ -303,6 +305,10 @@ class Assessment:
         )
         if abs(correlation) > 0.5 and estimate.likelihood.planar:
             lines.append(f"  correlation  gamma with release {correlation:+.2f}: their intervals hang together")
+        if not estimate.throw.frozen:
+            lines.append(
+                f"  slices       {estimate.throw.n_slices}, held: no interval allows for another number (--slices)"
+            )
         return [*lines, f"  residuals    {self.conclusion}"]
 
     def number(self, name: str) -> str:

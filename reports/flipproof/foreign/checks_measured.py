@@ -168,7 +168,7 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         raise NotApplicableError(f"changes under refinement are round-off, {max(changes['omega']):.2g} of omega_0")
     required = declared - ORDER_ROOM
     worst = min(orders, key=lambda name: orders[name])
-    where = f"0.05 s before any impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves"
+    where = f"0.05 s in which the equation has no impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves"
     observed, advice = f"{orders[worst]:.2f} ({worst})", ""
     if holds := orders[worst] >= required:
         uneven_changes = yield from _changes_before(traits, SMOOTH, levels, uneven=True)
@@ -205,8 +205,8 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         )
     else:
         default_advice = (
-            "a coefficient of the step, or the instant at which omega, r_CM or J are taken, or how a step is cut to a "
-            "time asked, costs the order"
+            "a coefficient of the step or its Jacobian, slopes that are remembered and how a step begins without them, "
+            "the instant at which omega, r_CM or J are taken, or how a step is cut to a time asked, costs the order"
         )
     return Observation(
         holds=holds,

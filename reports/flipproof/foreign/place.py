@@ -103,16 +103,18 @@ class Place:
         inert = f"; without effect there: {', '.join(self.inert)}" if self.inert else ""
         if self.on_lattice:
             return f"{self.solver} solves {nearest}; {following}{inert}"
-        return (
-            f"{self.solver} is off the lattice: the nearest equation is {nearest}, farther than its own error "
-            f"explains ({self.room:.2g}); {following}"
+        farther = (
+            f"and its error is unknown: {self.room:.2g}, a fifth of the distance to the next equation, is allowed"
+            if self.change is None
+            else f"farther than its own error explains ({self.room:.2g})"
         )
+        return f"{self.solver} is off the lattice: the nearest equation is {nearest}, {farther}; {following}"
 
     @property
     def advice(self) -> str:
         """What to do, if nothing but the place is known; else empty."""
         lost = not (self.still or self.on_lattice)
-        return "look for another restitution, drag or mass than the throw's" if lost else ""
+        return "look for another restitution, drag or mass than the throw's, or for other physics" if lost else ""
 
     def to_mapping(self) -> dict[str, object]:
         """Return the place as JSON-ready data."""
@@ -241,6 +243,7 @@ class Explanation:
     values: tuple[float, float]
     bars: dict[str, float]
     rest: float
+    slices: int
 
     @property
     def difference(self) -> float:
@@ -254,13 +257,23 @@ class Explanation:
         lines = [
             first.text,
             second.text,
-            f"mean of omega/omega_0 over the second half: {first.solver} {self.values[0]:.6f}, {second.solver} "
-            f"{self.values[1]:.6f}, difference {self.difference:+.6f}",
+            f"mean of omega/omega_0 over the second half, N = {self.slices}, each solver refined as certify does: "
+            f"{first.solver} {self.values[0]:.6f}, {second.solver} {self.values[1]:.6f}, difference "
+            f"{self.difference:+.6f}",
         ]
+        if self.bars:
+            lines.append("of this, on average over all orders in which the assumptions can be changed:")
         for name, share in self.bars.items():
-            part = f" ({share / self.difference:.1%} of it)" if self.difference else ""
+            part = f" ({share / self.difference:.1%} of it)" if abs(self.difference) > 1e-9 else ""
             lines.append(f"  {share:+.6f}  {NAMES[name]}{part}")
-        lines.append(f"  {self.rest:+.6f}  the rest, which no switch explains: errors of the two solvers")
+        lost = [one.solver for one in (first, second) if not one.on_lattice]
+        rest = (
+            f"what these do not explain; {' and '.join(lost)} solves no equation of the ladder, so that the shares are "
+            "those of the nearest one"
+            if lost
+            else "the rest: what no assumption explains, such as steps and errors of the two solvers"
+        )
+        lines.append(f"  {self.rest:+.6f}  {rest}")
         return "\n".join(lines)
 
 
@@ -277,7 +290,12 @@ def explain(first_runner: Runner, second_runner: Runner, throw: Scenario) -> Exp
     end = replace(second.switches, **{name: getattr(start, name) for name in second.inert})
     bars = shares(start, end, throw)
     return Explanation(
-        first=first, second=second, values=values, bars=bars, rest=values[1] - values[0] - sum(bars.values())
+        first=first,
+        second=second,
+        values=values,
+        bars=bars,
+        rest=values[1] - values[0] - sum(bars.values()),
+        slices=throw.n_slices,
     )
 
 

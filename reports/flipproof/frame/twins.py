@@ -88,6 +88,6 @@ def doubt(flight: Trajectory, seconds: float, tolerance: float = TRUSTED) -> str
         return ""
     when = "at no time" if np.isnan(until) else f"until t = {until:.4g} s"
     return (
-        f"{flight.label}: omega(t) may be trusted to {tolerance:g} omega_0 {when}; by the end {TWINS} twins, whose "
-        f"release differs in the eleventh digit, put its band at {band.largest:.1g} omega_0"
+        f"{flight.label}: omega(t) may be trusted to {tolerance:g} omega_0 {when}; by the end its band is "
+        f"{band.largest:.1g} omega_0, {SAFETY:g} times what {band.cause} changes"
     )

@@ -30,6 +30,7 @@ from flipproof.chapters.maps.study import (
     CURVE,
     EXTRA,
     LADDER,
+    NEGLIGIBLE,
     RUNGS,
     Axis,
     Reading,
@@ -46,6 +47,7 @@ from flipproof.figures.style import draw
 from flipproof.frame.columns import rows_csv
 from flipproof.frame.solvers import Run
 from flipproof.frame.store import Store
+from flipproof.frame.twins import FLOOR
 from flipproof.output.files import write_whole
 from flipproof.sweep.axes import FILL
 from flipproof.sweep.command import Begin, completed
@@ -129,7 +131,9 @@ def make_map(plan: MapPlan, out: Path, begin: Begin, **how: Any) -> str:
         write_whole(out / "map.csv", map_csv(study).encode())
         write_whole(out / "map.json", json.dumps(map_facts(study, plan.throw), indent=1, allow_nan=False).encode())
         shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
-        return f"{summary}\ncells by largest fair share: {shares or 'none'}; see {out / 'map.png'}"
+        words = f"cells by largest fair share of omega/omega_0, mean of the second half, N = {study.slices}"
+        small = f", below {NEGLIGIBLE:g} {_negligible(study)}" if _negligible(study) else ""
+        return f"{summary}\n{words}: {shares or 'none'}{small}; see {out / 'map.png'}"
 
 
 def map_csv(study: ValidityMap) -> str:
@@ -142,7 +146,7 @@ def map_csv(study: ValidityMap) -> str:
         **{f"fair share of {name}": share for name, share in zip(RUNGS, study.shares, strict=True)},
         **{f"largest difference of {name} from {LADDER[-1]}": study.largest[name] for name in NAMES},
         **{f"step error of {name}": study.step_error[name] for name in SCHEMES},
-        "largest fair share": np.array([*RUNGS, ""])[study.dominant],  # -1 where there is none
+        "largest fair share": np.array([*RUNGS, ""])[study.dominant],  # -1: none
         "reason": study.reason,
     }
     finite = [np.where(np.isfinite(c), c, np.nan) if c.dtype.kind == "f" else c for c in columns.values()]
@@ -157,7 +161,8 @@ def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
         "y": VALUES[study.axis],
         "ladder": list(LADDER),
         "cells by largest fair share": _dominating(study),
-        "cells without": int((study.dominant < 0).sum()),
+        f"cells below {NEGLIGIBLE:g}": _negligible(study),
+        "cells without": int(study.missing.sum()),
         "contours": [
             {
                 "of": words,
@@ -173,6 +178,10 @@ def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
 
 def _dominating(study: ValidityMap) -> dict[str, int]:
     return {name: int((study.dominant == k).sum()) for k, name in enumerate(RUNGS)}
+
+
+def _negligible(study: ValidityMap) -> int:
+    return int((study.dominant < 0).sum() - study.missing.sum())
 
 
 def _reading(row: Row) -> Reading:
@@ -250,14 +259,17 @@ def waterfall_csv(waterfalls: tuple[Waterfall, ...]) -> str:
 
 
 def _table(waterfall: Waterfall) -> str:
-    observable, space = waterfall.observable, 20 * " "
+    observable, space = waterfall.observable, 30 * " "
     lines = [
-        f"{observable.words} [{observable.unit}]: in the order shown, in reverse, mean of all orders",
+        f"{observable.words} [{observable.unit}], N = {waterfall.slices}: in the order shown, in reverse, mean of all "
+        "orders with its band, below which a mean cannot be told from 0",
         f"  {waterfall.start:+8.4f}  {space}published program",
     ]
-    lines += [f"  {bar.forward:+8.4f}  {bar.backward:+8.4f}  {bar.average:+8.4f}  {bar.name}" for bar in waterfall.bars]
+    for bar in waterfall.bars:
+        band = f"+- {max(bar.average_band, FLOOR):.1g}"
+        lines.append(f"  {bar.forward:+8.4f}  {bar.backward:+8.4f}  {bar.average:+8.4f} {band:9}  {bar.name}")
     lines += [
-        f"  {waterfall.end:+8.4f}  {space}free flight (+- {waterfall.end_band:.1g})",
+        f"  {waterfall.end:+8.4f}  {space}free flight (+- {max(waterfall.end_band, FLOOR):.1g})",
         f"  {waterfall.overlap:+8.4f}  {space}rods minus free flight: no overlap, no share",
     ]
     return "\n".join(lines)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up import command
 from planted import InProcess
 from planted.ours import MISTAKES
 
@@ -131,3 +132,12 @@ def test_the_lattice_tells_different_equations_apart():
     apart = [max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))
              for k, one in enumerate(curves) for other in curves[:k]]  # fmt: skip
     assert min(apart) > 0.02
+
+
+def test_what_solves_no_equation_of_the_ladder_is_not_split_as_if_it_did(capsys):
+    """The column is solved exactly: it has no error to be blamed, and its model no share."""
+    status, out, _ = command(capsys, "explain", "column", "free-flight", "--slices", "5")
+    assert status == 1
+    assert "its error is unknown: 0.04, a fifth of the distance to the next equation, is allowed" in out
+    assert "column solves no equation of the ladder, so that the shares are those of the nearest one" in out
+    assert "N = 5" in out

@@ -71,9 +71,13 @@ def land_throw(
 
 def describe(rows: Sequence[Row], table: Table) -> str:
     """Return what happens as lines: the touch of each bottle, then a line for each landing."""
+    usual = Table(height=table.height)
+    assumed = [name for name in ("restitution", "friction") if getattr(table, name) == getattr(usual, name)]
+    words = f" ({' and '.join(assumed)} assumed: no measured value was found)" if assumed else ""
+    slices = rows[0].touch.scenario.n_slices
     lines = [
-        f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g} (both assumed: no "
-        "measured ones were found)"
+        f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g}{words}; water of "
+        f"{slices} slices"
     ]
     bottles: set[str] = set()
     for row in rows:
@@ -87,11 +91,13 @@ def describe(rows: Sequence[Row], table: Table) -> str:
 
 def _touch_line(name: str, touch: Touch) -> str:
     read = touch_readings(touch)
+    falls = "rises" if read["touch_speed"] < 0.0 else "falls"
     stands = "below" if read["static_margin"] > 0.0 else "above"
     return (
         f"{name} touches at t = {touch.time:.4f} s: tilt {math.degrees(touch.tilt):+.1f} degrees, {stands} its "
-        f"toppling angle by {math.degrees(abs(read['static_margin'])):.1f}; omega {touch.omega:.2f} rad/s; falls at "
-        f"{read['touch_speed']:.2f} m/s; energy {read['touch_energy']:.2f} E_s (saddle {saddle(touch.scenario):.4f} J)"
+        f"toppling angle by {math.degrees(abs(read['static_margin'])):.1f}; omega {touch.omega:.2f} rad/s; {falls} at "
+        f"{abs(read['touch_speed']):.2f} m/s; energy {read['touch_energy']:.2f} E_s "
+        f"(saddle {saddle(touch.scenario):.4f} J)"
     )
 
 
@@ -101,7 +107,8 @@ def _how(outcome: Outcome) -> str:
     assert outcome.certified is not None
     assert outcome.margin is not None
     assert outcome.slid is not None
+    below = f"{outcome.margin:.1%}" if outcome.margin >= 5e-4 else "less than 0.1%"
     return (
-        f"{outcome.outcome}; certain {outcome.certified:.3f} s after the touch, {outcome.margin:.1%} below the saddle; "
-        f"bounces {outcome.bounces}; slid {1000 * outcome.slid:+.0f} mm"
+        f"{outcome.outcome}; certain {outcome.certified:.3f} s after the touch, {below} below the saddle; "
+        f"bounces {outcome.bounces}; its base is {1000 * outcome.slid:+.0f} mm along the table by then"
     )

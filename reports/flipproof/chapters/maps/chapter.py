@@ -22,6 +22,7 @@ from flipproof.chapters.maps.study import (
     EXTRA,
     LABELS,
     LADDER,
+    NEGLIGIBLE,
     RUNGS,
     SLICES,
     Axis,
@@ -114,7 +115,8 @@ def _exhibit(study: ValidityMap) -> Exhibit:
         title=f"Validity over filling and {AXES[study.axis]}",
         caption=f"Every cell is a throw. The shade of a cell is {shade} in the plateau, the mean of "
         "ω/ω₀ over the second half. "
-        f"The outline around cells names the assumption with the largest {which} in the plateau. "
+        f"The outline around cells names the assumption with the largest {which} in the plateau; cells without one "
+        f"have no share of {NEGLIGIBLE:g} of ω₀ or more. "
         f"The contours are where {contours}. Hatched cells could not be computed.{_thrown_words(study)}"
         f"{_band_words(study)}",
         alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "
@@ -221,7 +223,7 @@ def figure_map(study: ValidityMap) -> Figure:
             place: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": HALO}
             axes.text(study.fills[column], study.values[row], words, color=colour, size=8, weight="bold", **place)
     hatched: dict[str, Any] = {"facecolor": "none", "edgecolor": "#555555", "hatch": "////"}
-    for row, column in zip(*np.nonzero(study.dominant < 0), strict=True):
+    for row, column in zip(*np.nonzero(study.missing), strict=True):
         size = (x[column + 1] - x[column], y[row + 1] - y[row])
         axes.add_patch(Rectangle((x[column], y[row]), *size, linewidth=0, **hatched))
     for (name, error), colour in zip(shown, ("#000000", "#D00000"), strict=True):

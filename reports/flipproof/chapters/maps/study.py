@@ -70,6 +70,9 @@ SLICES: Final = 50
 POINTS: Final = 201
 """Output times of a model."""
 
+NEGLIGIBLE: Final = 1e-4
+"""Fair share, fraction of omega_0, below which none is named: what is left is round-off, or no matter."""
+
 CURVE: Final = 101
 """Equal times at which two runs are compared."""
 
@@ -131,10 +134,15 @@ class ValidityMap:
         return self.level[FREE] - self.level[RODS]
 
     @property
+    def missing(self) -> NDArray[np.bool_]:
+        """Whether any fair share is missing in a cell."""
+        return np.asarray(~np.isfinite(self.shares).all(axis=0))
+
+    @property
     def dominant(self) -> NDArray[np.int64]:
-        """Index into RUNGS of the largest fair share; -1 where any is missing."""
-        missing = ~np.isfinite(self.shares).all(axis=0)
-        return np.where(missing, -1, np.nan_to_num(np.abs(self.shares), nan=-1.0).argmax(axis=0))
+        """Index into RUNGS of the largest fair share; -1 where any is missing, or none reaches ``NEGLIGIBLE``."""
+        sizes = np.nan_to_num(np.abs(self.shares), nan=0.0)
+        return np.where(self.missing | (sizes.max(axis=0) < NEGLIGIBLE), -1, sizes.argmax(axis=0))
 
 
 def vary(throw: Scenario, *, fill: float, damping: float | None = None, restitution: float | None = None) -> Scenario:

@@ -33,7 +33,7 @@
       const means = data.solvers.map((name, k) => `${names[name]} ${value(cell.mean[k])}`).join(", ");
       const far = off(cell);
       said.textContent = `At filling ${Number(cell.x.toPrecision(3))} and γ/ω₀ = ${Number(cell.y.toPrecision(2))} the late spin, as a share of ω₀, is: ${means}. `
-        + `Off free flight: ${names[choice.value]} by ${Number.isFinite(far) ? `${Number((100 * far).toPrecision(2))} %` : "an unknown part"}. Largest fair share: ${cell.which || "unknown"}.`;
+        + `Off free flight: ${names[choice.value]} by ${Number.isFinite(far) ? `${Number((100 * far).toPrecision(2))} %` : "an unknown part"}. Largest fair share: ${cell.which || (Number.isFinite(far) ? "none that matters" : "unknown")}.`;
       const box = svg.querySelector(".map-here");
       box?.setAttribute("transform", svg.querySelector(`[data-cell="${i} ${j}"]`).dataset.place);
     }
