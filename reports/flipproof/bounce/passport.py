@@ -241,7 +241,7 @@ def time_of_hit(adapter: Adapter, dt: float) -> Measurement:
         location = f"the time of return changes with the phase of the step by {spread:.2g} steps"
     return Measurement(
         "time of hit",
-        f"{location}; a body is returned {fast.mean() / dt:.2g} steps late on average, at 8 m/s",
+        f"{location}; a body is returned late by {fast.mean() / dt:.2g} of a step on average, at 8 m/s",
         "; ".join(remarks),
         {"spread_steps": spread, "mean_steps": float(fast.mean() / dt), "floor_m": shift},
     )
@@ -344,7 +344,7 @@ def rest(adapter: Adapter, dt: float) -> Measurement:
         remarks.append(f"with e = 0 it rebounds by {rebound * 1e3:.2g} mm")
     return Measurement(
         "rest",
-        f"at rest it lies {low * 1e3:.2g} to {high * 1e3:.2g} mm above the floor, at {speed:.1e} m/s or less",
+        f"at rest its height over the floor is {low * 1e3:.2g} to {high * 1e3:.2g} mm, its speed {speed:.1e} m/s or less",
         "; ".join(remarks),
         {"lowest_m": low, "highest_m": high, "speed_m_s": speed, "rebound_of_e0_m": rebound},
     )

@@ -422,7 +422,7 @@ def compared(assessments: Sequence[Assessment]) -> str:
     best, *others = ranked(assessments)
     equivalent = [fit.estimate.solver for fit in others if best.estimate.evidence - fit.estimate.evidence <= INDISTINCT]
     worse = [
-        f"{fit.estimate.solver} by exp({best.estimate.evidence - fit.estimate.evidence:.0f})"
+        f"{fit.estimate.solver} by a factor of exp({best.estimate.evidence - fit.estimate.evidence:.0f})"
         for fit in others
         if best.estimate.evidence - fit.estimate.evidence > INDISTINCT
     ]

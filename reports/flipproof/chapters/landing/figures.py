@@ -69,7 +69,8 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             "landing-axes",
             "What the share depends on",
             f"Share of throws that end upright at filling {size.axis_filling:g}, along each assumption, with the "
-            f"others as they are; {size.axis_throws} throws a point. All points of an axis share the same throws.",
+            f"others as they are; {size.axis_throws} throws a point. All points of an axis share the same throws. The "
+            "95 % intervals (Wilson's, undecided throws counted both ways) are for one aim.",
             "; ".join(
                 f"P(upright) of water along {axis}: "
                 + ", ".join(f"{value:g}: {cell.share.value:.2f}" for value, cell in results.along(axis, "together"))
@@ -187,12 +188,13 @@ def map_csv(results: LandingStudy) -> str:
 
 def share_line(results: LandingStudy, family: str) -> str:
     """Return the shares of one family as lines."""
-    lines = [f"P(upright), {FAMILIES[family]}, 95 % intervals:"]
+    lines = [f"P(upright), {FAMILIES[family]}, with 95 % intervals of the best aim:"]
     for kind, landing in KINDS.items():
         words = []
         for fill, cell in results.along("filling", kind, family):
-            low, high = cell.share.interval
-            words.append(f"{fill:g}: {cell.share.value:.3f} [{low:.3f}, {high:.3f}]")
+            (low, high), share = cell.share.interval, cell.share
+            undecided = f", {share.undecided} undecided" if share.undecided else ""
+            words.append(f"{fill:g}: {share.upright} of {share.throws}{undecided} [{low:.3f}, {high:.3f}]")
         if words:
             lines.append(f"  {landing.words}: " + ", ".join(words))
     return "\n".join(lines)

@@ -249,7 +249,8 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
             continue
         for value in values[axis]:
             change: dict[str, Any] = {axis: size.scatter.times(value) if axis == "scatter" else value}
-            case = replace(_case(size, aim_of[place], kind, size.axis_throws, AXES[axis]), **change)
+            aim = replace(aim_of[place], rival=0.0)  # no other aim was tried with this table or scatter
+            case = replace(_case(size, aim, kind, size.axis_throws, AXES[axis]), **change)
             cases |= _cut(size, Key(axis, value, last, size.axis_filling, kind), case)
     fillings, omegas = size.map_axes
     for kind, fill, omega0 in product(WATER_AND_ICE, fillings.tolist(), omegas.tolist()):
