@@ -344,7 +344,7 @@ def rest(adapter: Adapter, dt: float) -> Measurement:
         remarks.append(f"with e = 0 it rebounds by {rebound * 1e3:.2g} mm")
     return Measurement(
         "rest",
-        f"at rest its height over the floor is {low * 1e3:.2g} to {high * 1e3:.2g} mm, its speed {speed:.1e} m/s or less",
+        f"at rest it is {low * 1e3:.2g} to {high * 1e3:.2g} mm over the floor, its speed at most {speed:.1e} m/s",
         "; ".join(remarks),
         {"lowest_m": low, "highest_m": high, "speed_m_s": speed, "rebound_of_e0_m": rebound},
     )
