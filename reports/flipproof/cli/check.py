@@ -226,6 +226,7 @@ def command_compare(options: argparse.Namespace) -> int:
         if path.is_file() or ((path.suffix or "/" in name) and ":" not in name):
             return read_curve(path)
         run, seconds = solve_timed(find(name).name, scenario)
+        flown.append(name)
         if len(run.t) < 2:
             raise ValueError(f"{name} has nothing to compare on this throw: {run.status}: {run.message}")
         warnings = [doubt(run, seconds, TRUSTED if options.tolerance is None else options.tolerance)]
@@ -235,7 +236,10 @@ def command_compare(options: argparse.Namespace) -> int:
         return replace(Curve.of(run), notes=tuple(filter(None, warnings)))
 
     stopped: list[str] = []
+    flown: list[str] = []
     comparison = compare(load(options.first), load(options.second))
+    if flown:
+        print(inert(f"{' and '.join(dict.fromkeys(flown))}: N = {scenario.n_slices} slices", lines=False))
     print(inert(table(comparison)))
     allowed = math.inf if options.tolerance is None else options.tolerance
     findings = claims(comparison, allowed, "; ".join(stopped))

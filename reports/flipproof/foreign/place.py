@@ -273,7 +273,7 @@ class Explanation:
             if lost
             else "the rest: what no assumption explains, such as steps and errors of the two solvers"
         )
-        lines.append(f"  {self.rest:+.6f}  {rest}")
+        lines.append(f"  {round(self.rest, 6) + 0.0:+.6f}  {rest}")
         return "\n".join(lines)
 
 
