@@ -241,7 +241,7 @@ def time_of_hit(adapter: Adapter, dt: float) -> Measurement:
         location = f"the time of return changes with the phase of the step by {spread:.2g} steps"
     return Measurement(
         "time of hit",
-        f"{location}; a body is returned late by {fast.mean() / dt:.2g} of a step on average, at 8 m/s",
+        f"{location}; a body is returned late by {fast.mean() / dt:.2g} steps on average, at 8 m/s",
         "; ".join(remarks),
         {"spread_steps": spread, "mean_steps": float(fast.mean() / dt), "floor_m": shift},
     )

@@ -268,8 +268,8 @@ class Explanation:
             lines.append(f"  {share:+.6f}  {NAMES[name]}{part}")
         lost = [one.solver for one in (first, second) if not one.on_lattice]
         rest = (
-            f"what these do not explain; {' and '.join(lost)} solves no equation of the ladder, so that the shares are "
-            "those of the nearest one"
+            f"what these do not explain; {' and '.join(lost)} {'solve' if lost[1:] else 'solves'} no equation of the "
+            "ladder, so that the shares are those of the nearest one"
             if lost
             else "the rest: what no assumption explains, such as steps and errors of the two solvers"
         )
