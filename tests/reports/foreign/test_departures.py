@@ -60,7 +60,7 @@ BOUNCING = replace(WEIGHTLESS, damping=0.0, angle=5.0)
         (
             lambda _, throw: replace(throw, drag=1.1 * throw.drag),
             replace(WHOLE, damping=0.0),
-            ["where there is drag", "x the drag alpha v / m and +", "x the drag alpha v_CM / m besides"],
+            ["where there is drag", "the drag, alpha (v - v_CM) / m, counts 1.1 times"],
         ),
         (
             lambda _, throw: replace(throw, restitution=0.9 * throw.restitution),
