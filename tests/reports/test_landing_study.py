@@ -406,6 +406,33 @@ def test_the_interval_of_the_mean_bounces_is_that_of_a_mean():
     assert math.isnan(cell_of(aim, rows[:1]).bounces_band)
 
 
+@pytest.mark.parametrize(
+    ("in_turn", "words"),
+    [(30, "by both laws water stands more often"), (2, "undecided by one law, or not alike by both")],
+)
+def test_water_stands_more_often_than_ice_only_if_both_laws_say_so(found, in_turn, words):
+    changed = dict(found.cells)
+    for kind, upright in (("together", 30), ("in-turn", in_turn), ("ice", 10)):
+        key = Key("filling", 0.4, "B", 0.4, kind)
+        stood = tuple(k < upright for k in range(40))
+        share = Share(upright=upright, undecided=0, throws=40)
+        changed[key] = replace(changed[key], share=share, stood=stood)
+    findings = {finding.id: finding for finding in claims(replace(found, cells=changed))}
+    assert findings["landing-water-minus-ice-0.4"].note.startswith(
+        f"{words}; with 95 % intervals: water, together, +0.500"
+    )
+    assert findings["landing-water-minus-ice-0.4"].value == pytest.approx(0.5)
+
+
+def test_an_interval_along_the_table_borrows_nothing_from_another_aim(found):
+    """No other aim was tried with another table or scatter; over the filling some were."""
+    rivals = {
+        key.axis == "filling": max(cell.share.rival for other, cell in found.cells.items() if other.axis == key.axis)
+        for key in found.cells
+    }
+    assert rivals[True] > rivals[False] == 0.0
+
+
 def test_the_distance_between_the_laws_has_an_interval_and_says_which(found):
     changed = dict(found.cells)
     for kind, stood in zip(("together", "in-turn"), pairs(10, 0, 20, 10), strict=True):
