@@ -39,7 +39,7 @@ class Band:
     t : (P,) - output times of the flight [s]
     size : (P,) - band, fraction of |omega_0|; it never falls, and is infinite where another flight has ended
     flights : int - how many flights the flight was compared with
-    cause : str - which of them is the farthest at the end, in words
+    cause : str - which of them goes farthest from it at any time, in words
     """
 
     t: FloatArray
@@ -104,17 +104,15 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
     except ValueError:
         pass
     speed, how = settings["rest_speed"], {"impact_law": settings["impact_law"], **method_settings}
-    variants = [{"twin": k, "rest_speed": speed} for k in range(1, twins + 1)]
-    causes = ["a twin, whose release differs in the eleventh digit,"] * twins
-    variants.append({"rest_speed": max(speed / CUT, MIN_REST_SPEED)})
-    causes.append(f"a rest speed {CUT:g} times smaller")
+    twin = "a twin, whose release differs in the eleventh digit,"
+    variants = [(twin, {"twin": k, "rest_speed": speed}) for k in range(1, twins + 1)]
+    variants.append((f"a rest speed {CUT:g} times smaller", {"rest_speed": max(speed / CUT, MIN_REST_SPEED)}))
     if method_settings["method"] != settings["method"]:
-        variants.append({"rest_speed": speed})
-        causes.append(f"method {method_settings['method']!r}")
+        variants.append((f"method {method_settings['method']!r}", {"rest_speed": speed}))
     omega = np.full((len(variants), len(flight.t)), np.inf)
-    for row, variant in zip(omega, variants, strict=True):
+    for row, (_, variant) in zip(omega, variants, strict=True):
         varied = solve(flight.scenario, settings["model"], flight.t, **how, **variant).omega
         row[: len(varied)] = varied
     size = np.maximum.accumulate(band_of(flight.omega, omega) / abs(flight.scenario.omega0))
     farthest = int(np.argmax(np.max(np.abs(omega - flight.omega), axis=1)))
-    return Band(flight.t, size, len(variants), causes[farthest])
+    return Band(flight.t, size, len(variants), variants[farthest][0])

@@ -110,7 +110,7 @@ def test_a_band_says_what_makes_it():
     """What a rest speed changes is not laid at the door of twins that change nothing."""
     bottle = Bottle(length=0.2, radius=0.03, mass=0.05, capacity=0.5)
     some = {"water_mass": 0.2, "n_slices": 20, "drag": 0.002, "restitution": 0.3, "omega0": 14.0, "theta0": 1.0}
-    throws = (Scenario(bottle=bottle, duration=0.7, **some), CHAOTIC)
+    throws = (Scenario(bottle=bottle, duration=0.7, **some), replace(CHAOTIC, restitution=1.0))  # nothing comes to rest
     resting, chaotic = (estimate_band(ode_reference.solve(throw, "free-flight")) for throw in throws)
     assert (resting.cause, chaotic.cause) == (
         "a rest speed 10 times smaller",

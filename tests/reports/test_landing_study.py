@@ -611,5 +611,5 @@ def test_a_landing_says_what_was_assumed_and_of_how_many_slices(tmp_path, capsys
     throw.write_text("[scenario]\nn_slices = 2\ndrag = 0.5\n")
     status, out, _ = command(capsys, "land", throw, "--friction", "0.1", "--law", "together")
     assert status == 0
-    assert "friction 0.1 (restitution assumed: no measured value was found); water of 2 slices" in out
+    assert "friction 0.1 (restitution assumed: no measured value was found); N = 2 slices" in out
     assert " mm along the table by then" in out

@@ -217,9 +217,9 @@ def command_compare(options: argparse.Namespace) -> int:
     from flipproof.frame.twins import TRUSTED, doubt
     from flipproof.output.tables import Curve, read_curve
 
-    scenario = read_scenario(options.scenario, options.slices)
-    if options.slices is None:
-        scenario = scenario.with_slices(min(50, scenario.n_slices))
+    scenario = read_scenario(options.scenario, options.slices, 50)
+    stopped: list[str] = []
+    flown: list[str] = []
 
     def load(name: str) -> Curve:
         path = Path(name)
@@ -235,8 +235,6 @@ def command_compare(options: argparse.Namespace) -> int:
             warnings.append(f"{stopped[-1]}; its flight counts up to t = {run.t[-1]:.4g} s of {scenario.duration:g} s")
         return replace(Curve.of(run), notes=tuple(filter(None, warnings)))
 
-    stopped: list[str] = []
-    flown: list[str] = []
     comparison = compare(load(options.first), load(options.second))
     if flown:
         print(inert(f"{' and '.join(dict.fromkeys(flown))}: N = {scenario.n_slices} slices", lines=False))

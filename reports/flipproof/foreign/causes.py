@@ -378,7 +378,7 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
         if best is not None and best[0] < 0.03:
             if best[1] == ("the drag alpha mean(v) / m",) and abs(best[2][0] - (1.0 - share)) < 0.02:
                 return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
-            if best[1][0] in (DRAG_OF_EQ8, DRAG_OF_FREE_FLIGHT) and count == 1:
+            if best[1] in ((DRAG_OF_EQ8,), (DRAG_OF_FREE_FLIGHT,)):
                 return f"{best[1][0]}, counts {1.0 - best[2][0]:.2g} times: look at alpha / m, twice the damping rate"
             if best[1] == (WEIGHT_OF_ITS_OWN,) and best[2][0] > 0.0:
                 return f"slices weigh as if g were {best[2][0]:.3g} m/s^2 where it is 0: take gravity from the throw"

@@ -132,7 +132,7 @@ def make_map(plan: MapPlan, out: Path, begin: Begin, **how: Any) -> str:
         write_whole(out / "map.json", json.dumps(map_facts(study, plan.throw), indent=1, allow_nan=False).encode())
         shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
         words = f"cells by largest fair share of omega/omega_0, mean of the second half, N = {study.slices}"
-        small = f", below {NEGLIGIBLE:g} {_negligible(study)}" if _negligible(study) else ""
+        small = f", below {NEGLIGIBLE:g} {count}" if (count := _negligible(study)) else ""
         return f"{summary}\n{words}: {shares or 'none'}{small}; see {out / 'map.png'}"
 
 

@@ -69,7 +69,7 @@ def claims(results: LandingStudy) -> Iterator[Finding]:
 
 def _water_and_ice(results: LandingStudy) -> Iterator[Finding]:
     """Yield P(water) - P(ice) for every filling, as far as both were thrown."""
-    for filling, water in results.along("filling", "together"):
+    for filling, _ in results.along("filling", WATER[0]):
         ice = results.cell("ice", filling)
         if ice is None:
             continue
@@ -83,7 +83,7 @@ def _water_and_ice(results: LandingStudy) -> Iterator[Finding]:
         laws = "; ".join(f"{law}, {d:+.3f} ({low:+.3f} to {high:+.3f})" for law, (d, low, high) in by_law.items())
         title = f"P(upright), water minus ice, at filling {filling:g} (abstract, section 3: redistribution helps)"
         note = f"{verdict}; with 95 % intervals: {laws}; the number is of the first; {results.assumed}"
-        difference, low, high = water.minus(ice)
+        difference, low, high = by_law[KINDS[WATER[0]].words]
         band = Band((high - low) / 2, "sample")
         yield observed(f"landing-water-minus-ice-{filling:g}", title, difference, "", note, band=band)
 

@@ -76,8 +76,8 @@ def describe(rows: Sequence[Row], table: Table) -> str:
     words = f" ({' and '.join(assumed)} assumed: no measured value was found)" if assumed else ""
     slices = rows[0].touch.scenario.n_slices
     lines = [
-        f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g}{words}; water of "
-        f"{slices} slices"
+        f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g}{words}; "
+        f"N = {slices} slices"
     ]
     bottles: set[str] = set()
     for row in rows:

@@ -247,9 +247,9 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
         place = last, size.axis_filling, KINDS[kind].frozen
         if place not in aim_of:
             continue
+        aim = replace(aim_of[place], rival=0.0)  # no other aim was tried with these tables and scatters
         for value in values[axis]:
             change: dict[str, Any] = {axis: size.scatter.times(value) if axis == "scatter" else value}
-            aim = replace(aim_of[place], rival=0.0)  # no other aim was tried with this table or scatter
             case = replace(_case(size, aim, kind, size.axis_throws, AXES[axis]), **change)
             cases |= _cut(size, Key(axis, value, last, size.axis_filling, kind), case)
     fillings, omegas = size.map_axes
