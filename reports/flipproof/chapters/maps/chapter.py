@@ -284,11 +284,13 @@ def _crosses(error: FloatArray, level: float) -> bool:
 
 
 def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[FloatArray]:
-    """Return the contour of ``error`` as lines of (fill fraction, value), each of shape (K, 2)."""
+    """Return the contour of ``error`` as lines of (fill fraction, value) on the map, each of shape (K, 2)."""
     if not _crosses(error, level):
         return []
     contours = Figure().subplots().contour(study.fills, study.values, error, levels=[level])
-    return [np.asarray(line) for line in contours.allsegs[0] if len(line)]
+    # Interpolation may miss the ends of an axis by a last digit.
+    low, high = np.array([(axis[0], axis[-1]) for axis in (study.fills, study.values)]).T
+    return [np.clip(line, low, high) for line in contours.allsegs[0] if len(line)]
 
 
 def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:
