@@ -25,7 +25,7 @@ def test_the_first_stop_skips_the_contents(visit):
         box = visited.page.locator(".skip").bounding_box()
         assert box["y"] >= 0
         visited.page.keyboard.press("Enter")
-        assert visited.page.url.endswith("#verdict")
+        visited.page.wait_for_url("**#verdict")
 
 
 def test_the_contents_of_a_phone_work_from_the_keyboard(visit):

@@ -92,12 +92,13 @@ def test_on_a_phone_the_contents_fold_into_a_bar_that_stays(visit):
         assert first.is_visible()
         assert button.get_attribute("aria-expanded") == "true"
         visited.page.locator('#contents a[href="#errata"]').click()
+        visited.page.wait_for_url("**#errata")
+        visited.page.wait_for_function("() => document.querySelector('.here').textContent === 'Errata of the paper'")
         assert first.is_hidden()
         heading = visited.page.locator("#errata summary").bounding_box()
         bar = button.bounding_box()
         assert bar["y"] == pytest.approx(0.0, abs=1.0)
         assert heading["y"] >= bar["y"] + bar["height"]
-        assert visited.page.locator(".here").inner_text() == "Errata of the paper"
 
 
 @pytest.mark.parametrize("file", ["index.html", "evidence.html"])

@@ -200,7 +200,7 @@ def test_sliders_work_from_the_keyboard_and_survive_a_reload(visit):
         visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown.fill > 0.54")
         now = line(visited, "eq8")
         assert now != was
-        assert "fill=" in visited.page.url
+        visited.page.wait_for_url("**fill=**")
         visited.page.reload(wait_until="load")
         visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown?.fill > 0.54")
         assert line(visited, "eq8") == now
@@ -220,6 +220,7 @@ def test_the_page_opens_with_a_switch_that_eq8_notices_and_free_flight_does_not(
         assert free == 0.0
         assert "free flight by 0 %" in scene.get_by_role("status").inner_text()
         visited.page.get_by_test_id("gravity").click()
+        visited.settle()
         assert list(map(float, scene.get_attribute("data-moved").split())) == [0.0, 0.0]
         assert visited.console == []
 

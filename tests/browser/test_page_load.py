@@ -204,7 +204,7 @@ def test_a_filter_is_part_of_the_address(visit, report):
         wanted = [f for f in report.findings if f.id.startswith("ice") and f.verdict == "pass"]
         assert visited.page.locator(".findings tbody tr:visible").count() == len(wanted) > 0
         visited.page.locator("[data-filter=solver]").select_option("eq8")
-        assert "solver=eq8" in visited.page.url
+        visited.page.wait_for_url("**solver=eq8**")
         visited.page.reload(wait_until="load")
         assert visited.page.locator(".findings tbody tr:visible").count() == 1
 
