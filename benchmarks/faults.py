@@ -93,8 +93,6 @@ FAULTS = (
      "test_waterfall.py"),
     ("reports/flipproof/curves/tube.py", "(inside[:-1] ^ inside[1:]) / 2", "(inside[:-1] ^ inside[1:])",
      "test_tube.py"),
-    ("reports/flipproof/chapters/model_form/chapter.py", "gci=float(1.25 * abs(gap))", "gci=float(3.0 * abs(gap))",
-     "test_model_form.py"),
     ("reports/flipproof/chapters/stability/chapter.py", '"good" if error <= GOOD else "wrong"',
      '"wrong" if error > GOOD else "good"', "test_stability.py"),
     ("reports/flipproof/film/estimate.py", "low, high = np.zeros(2)", "low, high = np.array([1.9, 0.0])",

@@ -10,7 +10,6 @@ import pytest
 
 from flipproof.build import Report, ask_of, build, gather_report
 from flipproof.chapters.solvers import WITNESSES
-from flipproof.chapters.work_precision.contenders import Effort, Grids
 from flipproof.frame.gather import Gathered
 from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.provenance import provenance
@@ -24,13 +23,6 @@ LOOPS = (
     "land(Touch(scenario=throw, r=throw.initial_positions(), **still), Table(height=0.0))",
 )
 """A call of each compiled loop."""
-
-WORK = Effort(
-    schemes=Grids(6, (4, 6)),
-    engines=Grids(4, (4,)),
-    methods={"DOP853": (1e-3, 1e-5, 1e-7), "LSODA": (1e-3, 1e-5, 1e-7)},
-)
-"""A small study of work and precision."""
 
 
 def pytest_sessionstart(session):
@@ -70,7 +62,7 @@ def gathered() -> Gathered:
     """Gathered once per process."""
     ask = replace(ask_of(Scenario(), "quick", 20, WITNESSES), reference=Scenario().with_slices(20))
     # In this process: test_report.py has a report made by workers, whose start costs a fifth of all of it.
-    return gather_report(ask, work={"work-precision": WORK}, pool=SerialExecutor())
+    return gather_report(ask, pool=SerialExecutor())
 
 
 @pytest.fixture(scope="session")

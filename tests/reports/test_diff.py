@@ -29,7 +29,6 @@ WORK = {
     "slices": (3, 6),
     "waterfall": 2,
     "exact-cases": (),
-    "model-form": (),
     "stability": Layout(panels=((18.0, 10),), dt=(2e-3, 2e-4), iterations=(10, 90), duration=0.1, budget=2e6),
     "horizon": Reach(solvers=("pymunk",), sizes=(1e-9,), seeds=(1,), slices=3),
     "overlap": Amount(fills=(1.0,), slices=3, dt=4e-4, brim_dt=1e-4),

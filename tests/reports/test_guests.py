@@ -238,7 +238,7 @@ def test_a_report_without_guests_has_no_such_chapter():
 
 
 def test_a_dead_worker_costs_its_guest(monkeypatch):
-    death = Call(os._exit, (3,), "guest naive RK4", timed=True)
+    death = Call(os._exit, (3,), "guest naive RK4", anew=True)
     monkeypatch.setattr("flipproof.chapters.guests.study.Call", lambda *_, **__: death)
     with workers(1) as pool:
         found = Reported(RK4, chapters=("guests",), pool=pool)

@@ -45,7 +45,7 @@ def test_every_witness_has_its_certificate(gathered, report, read_page):
     assert set(agreements["eq8"].names) == {"eq8", "solve_ivp"}
     assert not any(agreement.words.startswith("all but") for agreement in agreements.values())
     page = read_page(report.pages["evidence.html"])
-    assert {"engines", "work-precision", "figure-stability", "figure-horizon", "figure-overlap"} <= set(page.ids)
+    assert {"engines", "figure-stability", "figure-horizon", "figure-overlap"} <= set(page.ids)
 
 
 def test_an_engine_that_is_not_installed_is_named_with_its_reason(gathered):

@@ -64,7 +64,7 @@ def test_every_claim_is_evaluated_and_holds(gathered):
         "ice-exact-step", "ice-eq8", "ice-pymunk-rigid", "ice-welded-order", "vectors-python_default",
         "vectors-matlab_default", "order-exact-step-across-impacts", "order-published-python-before-the-first-impact",
         "reference-eq8", "reference-free-flight", "engine-gravity", "engine-default-explodes", "energy-free-flight",
-        "waterfall-plateau", "model-form-exact-step-eq8", "predictability-free-flight",
+        "waterfall-plateau", "predictability-free-flight",
     ):  # fmt: skip
         assert needed in ids
     assert sum(f.id.startswith("difference-") for f in findings) == len(PAIRS)
@@ -101,7 +101,7 @@ def test_every_figure_has_its_numbers_as_csv_with_units(report):
         filled = 0
         for name, cells in zip(header, columns, strict=True):
             numbers = [cell for cell in cells if cell]
-            assert numbers or exhibit.name in ("overlap", "work-precision-impacts", "stability"), (exhibit.name, name)
+            assert numbers or exhibit.name in ("overlap", "stability"), (exhibit.name, name)
             if numbers and all(is_number(cell) for cell in numbers):
                 assert re.search(r"\[[^]]+\]$", name), (exhibit.name, name)
                 filled += 1

@@ -22,7 +22,7 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
      ("differences",)),
     ("steps", "Step size",
      "How the error falls with the step, and what it costs to hold ω, θ, r_CM and v_CM constant over a step.",
-     ("finite_step", "step_size", "frozen", "model_form")),
+     ("finite_step", "step_size", "frozen")),
     ("slices", "How many slices", "How far the numbers move when the water is cut into more slices.", ("slices",)),
     ("events", "Impacts", "When slices hit the ends in each solver, which impacts correspond, and how a small change "
      "of the release grows.", ("alignment", "horizon")),
@@ -40,8 +40,6 @@ CONTENTS: Final[tuple[tuple[str, str, str, tuple[str, ...]], ...]] = (
     ("landing", "Does it stand?",
      "Scattered throws of water and of ice are landed on a table, and the share that ends upright is counted.",
      ("landing",)),
-    ("work-precision", "Work and precision",
-     "How much computing one more correct digit of ω costs, solver by solver.", ("work_precision",)),
     ("maps", "Maps of validity", "Over filling and damping, step size or restitution: how wrong an approximation is, "
      "and which assumption is to blame.", ("maps",)),
     ("paper", "The paper's figures and claims", "Every statement of the paper about its model and about the bottles "

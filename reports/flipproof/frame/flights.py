@@ -19,13 +19,13 @@ Key = TypeVar("Key", bound=Hashable)
 class Call:
     """A call that a worker makes for a study: a function of a module, and what it is called with.
 
-    ``timed`` says that it measures time: then its answer is of this report alone.
+    ``anew`` says that its answer is of this report alone, and never read from the store.
     """
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...] = ()
     label: str = ""
-    timed: bool = False
+    anew: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,13 +41,13 @@ def make_all(
     """Make runs in worker processes, equal ones once, but for those that the store has; keep slow ones there.
 
     One job for each run of an engine and of a witness, and groups of the others. Calls are made beside them, each a
-    job, and kept in the store too, but for those that measure time. This process only waits, so that it can be
+    job, and kept in the store too, but for those that are made anew. This process only waits, so that it can be
     interrupted at any time. Both results are in the order asked.
     """
     runs, store = list(dict.fromkeys(runs)), store or RunStore(None)
     died = f"the worker process died {TRIES} times with this"
     keeping = store.remembering(pool)
-    pending_calls = {call: (pool if call.timed else keeping).submit(call.function, *call.arguments) for call in calls}
+    pending_calls = {call: (pool if call.anew else keeping).submit(call.function, *call.arguments) for call in calls}
     finished: dict[Run, RunResult] = {run: stored for run in runs if (stored := store.find(run)) is not None}
     jobs = _jobs([run for run in runs if run not in finished])
     costs = {run: COSTS[_kind(run)] for job in jobs for run in job}

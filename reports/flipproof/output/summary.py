@@ -48,7 +48,6 @@ def summarise(
         "differences": [],
         "solvers": [],
         "paper": None,
-        "work_precision": {},
         "runs": [_run_mapping(flight) for flight in gathered.flights.values()],
         "problems": dict(note for result in results.values() for note in result.notes),
         "figures": [

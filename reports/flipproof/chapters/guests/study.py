@@ -92,10 +92,10 @@ class Visit:
 def study(ask: Ask) -> Study[tuple[Visit, ...]]:
     """Certify the guests of ``ask.work``, and read the flights of those that could be loaded.
 
-    A call that is timed is never answered from the store: whether somebody else's code changed is not known.
+    A call made anew is never answered from the store: whether somebody else's code changed is not known.
     """
     loaded = [guest for guest in ask.work if guest.traits is not None]
-    calls = {g: Call(certified, (g.spec, g.timeout), f"guest {g.label}", timed=True) for g in loaded if not g.curve}
+    calls = {g: Call(certified, (g.spec, g.timeout), f"guest {g.label}", anew=True) for g in loaded if not g.curve}
     ladder = {rung: ask.solvers[rung] for rung in LADDER} if loaded else {}
     flown = {guest: guest.run(ask.throw) for guest in loaded}
     efforts = [run for guest in loaded for run in guest.efforts(ask.throw)]

@@ -1,1 +1,0 @@
-"""Step size or another equation: what stays of a scheme's error as its step goes to zero."""
