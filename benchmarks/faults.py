@@ -91,7 +91,7 @@ FAULTS = (
      "test_studies.py"),
     ("reports/flipproof/frame/shapley.py", "math.factorial(n - size - 1)", "math.factorial(n - size)",
      "test_waterfall.py"),
-    ("reports/flipproof/curves/tube.py", "(inside[:-1] ^ inside[1:]) / 2", "(inside[:-1] ^ inside[1:])",
+    ("reports/flipproof/curves/tube.py", "bounds.append(bound + sign * dy)", "bounds.append(bound - sign * dy)",
      "test_tube.py"),
     ("reports/flipproof/chapters/stability/chapter.py", '"good" if error <= GOOD else "wrong"',
      '"wrong" if error > GOOD else "good"', "test_stability.py"),

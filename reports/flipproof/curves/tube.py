@@ -11,43 +11,9 @@ dy further. A steep flank may thus come up to dt earlier or later; a level may b
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 import numpy as np
 
-from flipproof.curves.growth import first_crossing
 from slicemodel.trajectory import FloatArray
-
-
-class Held(NamedTuple):
-    """A curve compared with the tube around another: the share of the other's time that it spends inside.
-
-    It first leaves the tube at ``first_exit``, None if never, and is outside by ``largest`` at most.
-    """
-
-    share: float
-    first_exit: float | None
-    largest: float
-
-
-def hold(times: FloatArray, values: FloatArray, at: FloatArray, curve: FloatArray, *, dt: float, dy: float) -> Held:
-    """Compare a curve (``at``, ``curve``) with the tube around (``times``, ``values``), both linear between points.
-
-    ``dt`` and ``dy`` are not negative; where the curve does not exist it counts as outside.
-    """
-    corners = np.concatenate([times, at, times - dt, times + dt])
-    t = np.unique(corners[(corners >= times[0]) & (corners <= times[-1])])
-    lower, upper = tube_around(times, values, t, dt, dy)
-    value = np.interp(t, at, curve, left=math.nan, right=math.nan)
-    outside = np.maximum(value - upper, lower - value)
-    outside[np.isnan(outside)] = np.inf  # where the run does not exist
-    inside = outside <= 0.0
-    durations = np.diff(t) * (inside[:-1] & inside[1:]) + np.diff(t) * (inside[:-1] ^ inside[1:]) / 2
-    share = float(durations.sum() / (t[-1] - t[0])) if len(t) > 1 else float(inside[0])
-    first_exit = first_crossing(t, outside, 0.0)
-    largest = float(np.maximum(outside[(t >= at[0]) & (t <= at[-1])], 0.0).max(initial=0.0))
-    return Held(share, first_exit, largest)
 
 
 def tube_around(

@@ -1,4 +1,4 @@
-"""Events: the contacts and impacts of two flights side by side, and one omega(t) in the tube around the other.
+"""Events: the contacts and impacts of two flights side by side.
 
 Impacts of a slice on an end are matched in order, with the smallest sum of shifts; two that lie within ``SHIFT`` of
 each other are one impact of both flights, every other is one flight's alone. Near rest a slice bounces infinitely
@@ -21,9 +21,8 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from flipproof.curves.events import IndexArray, closest
-from flipproof.curves.tube import Held, hold
 from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, observed, results_of
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Outcome, Study, attempt, results_of
 from flipproof.frame.columns import rows_csv
 from flipproof.frame.solvers import Missing
 from slicemodel import Trajectory
@@ -37,9 +36,6 @@ SHIFT: Final = 1e-3
 
 MIN_SPEED: Final = 1e-2
 """Slower impacts are the tail of a slice that comes to rest [m/s]."""
-
-TUBE: Final = 2e-3, 0.01
-"""Half widths of the tube: in time [s], and in omega as a fraction of omega_0."""
 
 LANES: Final = 0.2, -0.2
 END_COLOURS: Final = {BASE: "#0072B2", CAP: "#E69F00"}
@@ -147,40 +143,23 @@ def rest_intervals(run: Trajectory) -> Table:
     return np.rec.fromarrays(columns, formats="i8,i8,f8,f8", names="slice,end,start,stop")
 
 
-def study_tube(reference: Trajectory, run: Trajectory) -> tuple[Held, str]:
-    """Hold the omega of a run against the tube around that of the reference, and say in words what became of it."""
-    dt, dy = TUBE[0], TUBE[1] * abs(reference.scenario.omega0)
-    held = hold(reference.t, reference.omega, run.t, run.omega, dt=dt, dy=dy)
-    tube = f"the tube of ±{dt * 1e3:g} ms and ±{dy:.3g} rad/s around {reference.label} in omega"
-    if held.first_exit is None:
-        return held, f"{run.label} stays in {tube}"
-    words = f"{run.label} leaves {tube} at {held.first_exit * 1e3:.1f} ms, "
-    words += f"is inside for {held.share:.1%} of the time and at most {held.largest:.3g} rad/s outside"
-    return held, words + (f"; it ends at {run.t[-1] * 1e3:.1f} ms" if run.t[-1] < reference.t[-1] else "")
-
-
-Pairs = Mapping[tuple[str, str], tuple[Outcome[Alignment], Outcome[tuple[Held, str]]]]
-"""Every pair aligned, and in its tube."""
+Pairs = Mapping[tuple[str, str], Outcome[Alignment]]
+"""Every pair aligned."""
 
 
 def study(ask: Ask) -> Study[Pairs]:
-    """Align the impacts of the pairs, and hold their omega in tubes."""
+    """Align the impacts of the pairs."""
     flights = yield [ask.solvers[name] for pair in PAIRS for name in pair]
 
-    def both(study: Any, pair: tuple[str, str]) -> Outcome[Any]:
-        return attempt(lambda: study(*(flights[ask.solvers[name]].flight for name in pair)))
+    def aligned(pair: tuple[str, str]) -> Alignment:
+        return study_alignment(*(flights[ask.solvers[name]].flight for name in pair))
 
-    return {pair: (both(study_alignment, pair), both(study_tube, pair)) for pair in PAIRS}
+    return {pair: attempt(aligned, pair) for pair in PAIRS}
 
 
 def claims(results: Pairs) -> Claims:
-    """Yield the share of the time that each second curve spends in the tube around the first: early is no failure."""
-    for (first, second), (aligned, tube) in results.items():
-        if tube.result is None:
-            yield Absent(f"tube-{first}-{second}", f"tube of {first} and {second}", tube.reason, "observation")
-        else:
-            (held, words), title = tube.result, f"{second} in the tube around {first}: share of the time"
-            yield observed(f"tube-{first}-{second}", title, held.share, "", words)
+    """Yield what could not be aligned; that two flights differ is no failure."""
+    for (first, second), aligned in results.items():
         if aligned.result is None:
             title = f"alignment of {first} and {second}"
             yield Absent(f"alignment-{first}-{second}", title, aligned.reason, "observation")
@@ -188,7 +167,7 @@ def claims(results: Pairs) -> Claims:
 
 def figures(results: Pairs) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
-    for (first, second), alignment in results_of({pair: aligned for pair, (aligned, _) in results.items()}).items():
+    for (first, second), alignment in results_of(results).items():
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",
