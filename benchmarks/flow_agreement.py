@@ -48,11 +48,10 @@ class Flown(Protocol):
 
 @dataclass(frozen=True)
 class Case:
-    """One throw, the equation it obeys and the impact law."""
+    """One throw and the equation it obeys."""
 
     scenario: Scenario
     model: str
-    impact_law: str = "simultaneous"
 
 
 def random_case(rng: np.random.Generator, most_slices: int = 100) -> Case:
@@ -76,12 +75,12 @@ def random_case(rng: np.random.Generator, most_slices: int = 100) -> Case:
         theta0=float(rng.uniform(-3.0, 3.0)),
         duration=float(rng.uniform(0.2, 0.5)),
     )
-    return Case(scenario, model, "sequential" if rng.random() < 0.25 else "simultaneous")
+    return Case(scenario, model)
 
 
 def flow(case: Case) -> Trajectory:
     """Return the run by the reduced flow."""
-    return ode_reference.solve(case.scenario, case.model, impact_law=case.impact_law)
+    return ode_reference.solve(case.scenario, case.model)
 
 
 def integrated(case: Case) -> Trajectory:
@@ -93,7 +92,6 @@ def integrated(case: Case) -> Trajectory:
         rtol=1e-13,
         atol=1e-15,
         max_step=min(0.005 / abs(case.scenario.omega0), case.scenario.duration),
-        impact_law=case.impact_law,
     )
 
 

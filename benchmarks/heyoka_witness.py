@@ -24,7 +24,7 @@ from flow_agreement import Case, first_parting, flow, impacts_of
 
 import ode_reference
 from ode_reference.contact import Ends, resolve
-from ode_reference.impacts import LAWS, immovable
+from ode_reference.impacts import immovable, simultaneous
 from ode_reference.models import MODELS
 from ode_reference.motion import Motion, Throw
 from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
@@ -76,7 +76,7 @@ def fly(case: Case, kind: type = float) -> Found:
     """Return the flight by heyoka in numbers of that kind."""
     scenario, n = case.scenario, case.scenario.n_slices
     switches = MODELS[case.model].switches
-    law = LAWS[case.impact_law] if switches.recoil else immovable
+    law = simultaneous if switches.recoil else immovable
     rest_speed = REST_SPEED_WITH_RECOIL if switches.recoil else REST_SPEED
     ends = Ends.of(scenario, recoil=switches.recoil)
     motion = Motion(Throw.of(scenario), MODELS[case.model], np.zeros(n, bool))

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ode_reference.bands import estimate_band
     from ode_reference.combinations import model_of
-    from ode_reference.impacts import LAWS
     from ode_reference.landing.flight import fly, turn
     from ode_reference.landing.land import land
     from ode_reference.models import LADDER, MODELS
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "LADDER",
-    "LAWS",
     "METHODS",
     "MODELS",
     "Switches",
@@ -38,7 +36,6 @@ __all__ = [
 
 _HOMES = {
     "LADDER": "ode_reference.models",
-    "LAWS": "ode_reference.impacts",
     "METHODS": "ode_reference.witness",
     "MODELS": "ode_reference.models",
     "Switches": "ode_reference.switches",

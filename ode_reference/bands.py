@@ -103,7 +103,7 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
         method_settings = {"method": TAYLOR}
     except ValueError:
         pass
-    speed, how = settings["rest_speed"], {"impact_law": settings["impact_law"], **method_settings}
+    speed = settings["rest_speed"]
     twin = "a twin, whose release differs in the eleventh digit,"
     variants = [(twin, {"twin": k, "rest_speed": speed}) for k in range(1, twins + 1)]
     variants.append((f"a rest speed {CUT:g} times smaller", {"rest_speed": max(speed / CUT, MIN_REST_SPEED)}))
@@ -111,7 +111,7 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
         variants.append((f"method {method_settings['method']!r}", {"rest_speed": speed}))
     omega = np.full((len(variants), len(flight.t)), np.inf)
     for row, (_, variant) in zip(omega, variants, strict=True):
-        varied = solve(flight.scenario, settings["model"], flight.t, **how, **variant).omega
+        varied = solve(flight.scenario, settings["model"], flight.t, **method_settings, **variant).omega
         row[: len(varied)] = varied
     size = np.maximum.accumulate(band_of(flight.omega, omega) / abs(flight.scenario.omega0))
     farthest = int(np.argmax(np.max(np.abs(omega - flight.omega), axis=1)))

@@ -155,7 +155,7 @@ def _flown(model: Model, scenario: Scenario) -> Iterator[State]:
     """Yield the states of the flight that a model's switches make, at ``FLOWN`` times."""
     from ode_reference.flow import api  # it is not needed to name an equation
 
-    settings = {"model": model.name, "rest_speed": 1e-6, "impact_law": "wall", "energy": False}
+    settings = {"model": model.name, "rest_speed": 1e-6, "energy": False}
     flight = api.fly(scenario, np.linspace(0.0, scenario.duration, FLOWN), model.switches, settings)
     for theta, r, v in zip(flight.theta, flight.r, flight.v, strict=True):
         yield float(theta), r, v, np.where((v == 0.0) & ((r <= scenario.r_min) | (r >= scenario.r_max)), 0.0, 1.0)

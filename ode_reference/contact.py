@@ -131,7 +131,7 @@ def resolve(
     side = (struck + resting)[touching]
     r[touching] = np.where(side == BASE, ends.high, ends.low)
     if struck.any():
-        after, gained = law(np.maximum(side * v[touching], 0.0), side, restitution, ratio, rest_speed)
+        after, gained = law(np.maximum(side * v[touching], 0.0), side, restitution, ratio)
         v -= gained
         v[touching] = side * after
     slow = np.where(np.abs(v[touching]) < rest_speed, side, FREE)

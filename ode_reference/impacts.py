@@ -9,41 +9,33 @@ Relative to the tube, *every* slice jumps, touching or not:
 
     v_i+ = v_i- - s_i p_i / m - P / M_b
 
-Momentum is conserved whatever the impulses are. They follow from one of two laws, which differ when one slice rests
-on the base while another strikes the cap. A law takes the approach speeds x and the sides of all touching slices,
-those at rest with x = 0 included, and returns the speeds after the impact and the velocity P / M_b that the tube gains.
+Momentum is conserved whatever the impulses are. They follow from the law of Newton and Moreau. A law takes the approach
+speeds x and the sides of all touching slices, those at rest with x = 0 included; it returns the speeds after the impact
+and the velocity P / M_b that the tube gains. docs/theory.md, section 3, says what another law would change.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Final
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slicemodel.trajectory import FloatArray
 
-TIE: Final = 1e-9
-"""Approach speeds that differ by no more than this fraction are equal to ``sequential``."""
-
-Law = Callable[[FloatArray, NDArray[np.int64], float, float, float], tuple[FloatArray, float]]
-
-PASSES: Final = 1000
-"""Most binary impacts per touching slice of one instant that ``sequential`` resolves before it ends the exchange."""
+Law = Callable[[FloatArray, NDArray[np.int64], float, float], tuple[FloatArray, float]]
 
 
 def immovable(
-    x: FloatArray, side: NDArray[np.int64], restitution: float, mass_ratio: float, rest_speed: float
+    x: FloatArray, side: NDArray[np.int64], restitution: float, mass_ratio: float
 ) -> tuple[FloatArray, float]:
     """Return the rebound of a tube that does not move: x -> -e x for each slice alone (all rungs but the last)."""
-    del side, mass_ratio, rest_speed
+    del side, mass_ratio
     return -restitution * x, 0.0
 
 
 def simultaneous(
-    x: FloatArray, side: NDArray[np.int64], restitution: float, mass_ratio: float, rest_speed: float
+    x: FloatArray, side: NDArray[np.int64], restitution: float, mass_ratio: float
 ) -> tuple[FloatArray, float]:
     """Return the velocities after the impact by the law of Newton and Moreau.
 
@@ -65,7 +57,6 @@ def simultaneous(
     side : array, shape (K,) - +1 on the base, -1 on the cap
     restitution : float - e
     mass_ratio : float - m / M_b
-    rest_speed : float [m/s] - not used: this law needs no end to its exchanges
 
     Returns
     -------
@@ -77,7 +68,6 @@ def simultaneous(
     Round-off; K log K operations. Energy never grows for e <= 1: it changes by
     -(1-e)/(1+e) (1/2) (sum p_i^2 / m + P^2 / M_b), so that e = 1 conserves it however many slices touch.
     """
-    del rest_speed
     corner = (1.0 + restitution) * x
     gained = _tube_velocity(corner, side, mass_ratio)
     pushed = corner - side * gained > 0.0
@@ -106,41 +96,3 @@ def _tube_velocity(corner: FloatArray, side: NDArray[np.int64], mass_ratio: floa
     # right corner.
     inside = np.flatnonzero(candidates[:-1] <= place)
     return float(candidates[inside[0]] if inside.size else candidates[-1])
-
-
-def sequential(
-    x: FloatArray, side: NDArray[np.int64], restitution: float, mass_ratio: float, rest_speed: float
-) -> tuple[FloatArray, float]:
-    """Return the velocities after binary impacts, the fastest approach first, until nothing approaches.
-
-    Of slices that approach equally fast the first one (the nearest to the base at release) comes first.
-
-    One impact of slice i alone: x_i -> -e x_i, the tube gains s_i (1+e) x_i (m/M_b) / (1 + m/M_b), and every other
-    touching slice, the resting ones included, sees its end come or go by that.
-
-    With e < 1 the exchange between slices on opposite ends may go on for ever with speeds that fall geometrically, and
-    with e = 0 too. It is ended once the fastest approach is below the rest speed, or after ``PASSES`` impacts per
-    slice: what still approaches is resolved by ``simultaneous`` with e = 0. Parameters and results as there.
-    """
-    x = x.copy()
-    signs = side.astype(np.float64)
-    gained = 0.0
-    for _ in range(PASSES * len(x)):
-        # The first of those that are equally fast: between mirror images round-off must not choose.
-        i = int(np.argmax(x >= (1.0 - TIE) * x.max()))
-        fastest = x[i]
-        if fastest < rest_speed:
-            break
-        step = float(signs[i] * (1.0 + restitution) * fastest * mass_ratio / (1.0 + mass_ratio))
-        x -= signs * step
-        x[i] = -restitution * fastest
-        gained += step
-    if np.any(x > 0):
-        # All of them, for an end that moves on may catch up with a slice that was leaving.
-        x, last = simultaneous(x, side, 0.0, mass_ratio, rest_speed)
-        gained += last
-    return x, gained
-
-
-LAWS: Final[Mapping[str, Law]] = MappingProxyType({"simultaneous": simultaneous, "sequential": sequential})
-"""The impact laws with recoil, by name."""

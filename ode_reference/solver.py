@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from ode_reference.arguments import number_within, velocities_of
 from ode_reference.combinations import is_ours, model_of, require_own_switches
-from ode_reference.impacts import LAWS
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import Switches, are_switches
@@ -80,7 +79,6 @@ def solve(
     atol: float | None = None,
     max_step: float | None = None,
     rest_speed: float | None = None,
-    impact_law: str = "simultaneous",
     energy: bool = False,
     twin: int = 0,
     own_inertia: bool = False,
@@ -114,9 +112,6 @@ def solve(
         Speed below which a slice that an end pushes back stays there, in [1e-8, 0.1] [m/s]. By default 1e-5, and 1e-3
         with recoil: there the tube shakes resting slices off at every impact, and a tenth of the rest speed makes
         several times as many impacts without narrowing the band of omega.
-    impact_law : str
-        "simultaneous" (Newton-Moreau) or "sequential" (the fastest pair first): which impulses act when several
-        slices touch the ends. Matters only for models whose impacts move the tube.
     energy : bool
         Whether to keep the energy ledger, ``diagnostics["energy"]`` [J] (``ode_reference.energy``): "initial", "final",
         the work of each term, of impacts and of rests, and the "residual" that none of them explains.
@@ -161,7 +156,7 @@ def solve(
     nothing of that band: ``ode_reference.estimate_band(flight)`` estimates it from eight twins, for a flight by any
     method, and ``trusted_until`` says up to when (docs/theory.md, "Rests, and the band they cost"). Where gamma =
     |omega0| exactly and ``roots`` are off, nothing pushes the water and it stays where it is. A full bottle that no
-    weight pulls along its axis is its own mirror image for ever, by the simultaneous law: all methods hold it to that,
+    weight pulls along its axis is its own mirror image for ever: all methods hold it to that,
     since rounding would part the two halves as exp(theta) grows, and the hits of a pair with them. Water a hair short
     of full does part, after some turns.
 
@@ -178,14 +173,13 @@ def solve(
     if true_or_false("own_inertia", own_inertia):
         run = solve(
             with_own_inertia(scenario), model, times, method=method, rtol=rtol, atol=atol, max_step=max_step,
-            rest_speed=rest_speed, impact_law=impact_law, energy=energy, twin=twin, speeds=speeds,
+            rest_speed=rest_speed, energy=energy, twin=twin, speeds=speeds,
         )  # fmt: skip
         return replace(run, scenario=scenario, settings={**run.settings, "own_inertia": True})
     if isinstance(model, str) and model in WATERS:
         run = import_module(f"ode_reference.{model}").solve(scenario, rtol, atol, times)
         return cast(Trajectory, run)
     chosen = model_named(model)
-    known_name("impact_law", impact_law, LAWS)
     known_name("method", method, (TAYLOR, *INTEGRATORS))
     speed, twin = _rest_speed(rest_speed, chosen), _twin(twin)
     t_out = output_times(scenario, times)
@@ -197,7 +191,7 @@ def solve(
 
         return witness.integrate(
             scenario, chosen, t_out, method=method, rtol=rtol, atol=atol, max_step=max_step, rest_speed=speed,
-            impact_law=impact_law, energy=energy, twin=twin,
+            energy=energy, twin=twin,
         )  # fmt: skip
     for name, value in (("rtol", rtol), ("atol", atol), ("max_step", max_step)):
         if value is not None:
@@ -208,7 +202,7 @@ def solve(
     require_own_switches(chosen, scenario)
     from ode_reference.flow import api
 
-    settings = _settings(chosen, speed, impact_law, energy, twin)
+    settings = _settings(chosen, speed, energy, twin)
     if speeds is None:
         return api.fly(scenario, t_out, chosen.switches, settings)
     velocities = velocities_of(scenario, speeds)
@@ -232,7 +226,6 @@ def solve_batch(
     times: ArrayLike | None = None,
     *,
     rest_speed: float | None = None,
-    impact_law: str = "simultaneous",
     energy: bool = False,
     twin: int = 0,
     states: bool = False,
@@ -247,7 +240,7 @@ def solve_batch(
         Output times of all throws, or of each [s]; 1000 uniform ones over each throw's duration by default.
     states : bool - whether r and v are kept; without, they have shape (0, N) in the trajectories
     jobs : int, optional - threads, in [1, 1024]; one per core by default
-    model, rest_speed, impact_law, energy, twin - as of ``solve``
+    model, rest_speed, energy, twin - as of ``solve``
 
     Returns
     -------
@@ -270,7 +263,6 @@ def solve_batch(
     chosen = model_named(model)
     for throw in throws:
         require_own_switches(chosen, throw)
-    known_name("impact_law", impact_law, LAWS)
     energy, states = true_or_false("energy", energy), true_or_false("states", states)
     given = None if times is None else times_given(times)
     if given is not None and given.ndim == 2 and len(given) != len(throws):
@@ -285,15 +277,13 @@ def solve_batch(
     if states:
         slices = sum(throw.n_slices for throw in throws)
         check_states(slices, t_out.shape[1], "leave out states, or solve fewer throws at a time")
-    settings = _settings(chosen, _rest_speed(rest_speed, chosen), impact_law, energy, _twin(twin))
+    settings = _settings(chosen, _rest_speed(rest_speed, chosen), energy, _twin(twin))
     return api.fly_all(throws, t_out, jobs, chosen.switches, settings, states=states)
 
 
-def _settings(model: Model, rest_speed: float, impact_law: str, energy: bool, twin: int) -> dict[str, Any]:
+def _settings(model: Model, rest_speed: float, energy: bool, twin: int) -> dict[str, Any]:
     """Return the settings that repeat a run by "taylor"."""
-    settings = {
-        "model": model.name, "method": TAYLOR, "rest_speed": rest_speed, "impact_law": impact_law, "energy": energy,
-    }  # fmt: skip
+    settings = {"model": model.name, "method": TAYLOR, "rest_speed": rest_speed, "energy": energy}
     return settings | ({"twin": twin} if twin else {})
 
 

@@ -32,7 +32,7 @@ from ode_reference import messages
 from ode_reference.arguments import number_above, number_within
 from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
 from ode_reference.energy import Ledger, nodes
-from ode_reference.impacts import LAWS, immovable
+from ode_reference.impacts import immovable, simultaneous
 from ode_reference.motion import Model, Motion, Throw
 from ode_reference.twins import twin_of
 from slicemodel.observables import grazes, opposite_hits
@@ -77,7 +77,6 @@ def integrate(
     atol: float | None,
     max_step: float | None,
     rest_speed: float,
-    impact_law: str,
     energy: bool,
     twin: int = 0,
 ) -> Trajectory:
@@ -96,7 +95,6 @@ def integrate(
         "rtol": number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2),
         "atol": number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2),
         "rest_speed": rest_speed,
-        "impact_law": impact_law,
         "method": known_name("method", method, METHODS),
         "max_step": number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s"),
         "energy": energy,
@@ -135,14 +133,14 @@ class _Flight:
         recoil = model.switches.recoil
         self.scenario, self.settings, self.t_out, self.n = scenario, settings, t_out, n
         self.motion = Motion(Throw.of(scenario), model, np.zeros(n, dtype=bool))
-        self.law = LAWS[settings["impact_law"]] if recoil else immovable
+        self.law = simultaneous if recoil else immovable
         self.ends = Ends.of(scenario, recoil=recoil)
         # Ice, or a single slice as long as the tube: nothing can move.
         self.immobile = scenario.frozen or self.ends.high - self.ends.low <= self.ends.reach
-        # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
+        # Nothing tells the ends of a full bottle apart if no weight pulls along it.
         weightless = model.switches.weightless or scenario.gravity == 0.0
         stacked = type(scenario).initial_positions is Scenario.initial_positions
-        self.mirrored = stacked and scenario.fill_fraction == 1.0 and weightless and self.law is not LAWS["sequential"]
+        self.mirrored = stacked and scenario.fill_fraction == 1.0 and weightless
         self.t = 0.0
         self.y = np.concatenate([[scenario.theta0], scenario.initial_positions() + moved, np.zeros(n)])
         self.resting: SideArray = np.zeros(n, dtype=np.int64)

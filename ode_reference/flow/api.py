@@ -38,7 +38,7 @@ def fly(
     Parameters
     ----------
     t_out : array, shape (P,) - output times [s]
-    settings : mapping - "model", the name of the equation; "rest_speed" [m/s], "impact_law", "energy"
+    settings : mapping - "model", the name of the equation; "rest_speed" [m/s], "energy"
     states : bool - whether r and v are kept
     speeds : array, shape (N,) - velocities of the slices at release [m/s]
     """

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from ode_reference.flow.laws import sequential, simultaneous
+from ode_reference.flow.laws import simultaneous
 from ode_reference.flow.layout import AFTER, APPROACH, COUNT, END, INDEX, NEAR, SIDE
 from ode_reference.flow.ledger import book_jump, speeds_of
 from ode_reference.flow.points import count, enter, set_body, set_scales, where
@@ -29,18 +29,11 @@ def touch(now, points, marks):
     """List the contacts of this instant: slices that strike, at release those that touch, and the slices at rest.
 
     Two slices that strike at the same time are located at times that differ by rounding: contact is also what a slice
-    reaches within four units in the last place of the time. To the sequential law each slice at rest is free. In a full
-    bottle a slice and its image strike together.
+    reaches within four units in the last place of the time. In a full bottle a slice and its image strike together.
     """
     # Nothing moves in an instant: omega and the centre of mass belong to all that follows.
     set_scales(now)
     now.hits, standing = 0, STANDING * now.wall * abs(now.omega)
-    if now.sequential:
-        for i in range(points.shape[1]):
-            if marks[SIDE, i] != 0:
-                enter(now, points, i, marks[SIDE, i] * now.wall, 0.0)
-                add(now, points, marks, i, marks[SIDE, i], 1, 0.0)
-        now.on_base = now.on_cap = 0
     for side, resting in ((1, now.on_base), (-1, now.on_cap)):
         if resting > 0:
             add(now, points, marks, -1, side, resting, 0.0)
@@ -86,10 +79,7 @@ def meet(now, points, marks, impacts):
     at_rest = now.wall * (now.on_base - now.on_cap)
     now.y_cm = now.slice_mass * (now.free * now.y_mean + at_rest) / now.total_mass
     before = speeds_of(now, points, marks)
-    if now.sequential:
-        now.dy_mean -= sequential(now, points, marks)
-    else:
-        now.dy_mean -= simultaneous(now, points, APPROACH, now.restitution)
+    now.dy_mean -= simultaneous(now, points, now.restitution)
     for k in range(now.hits):
         j, end = marks[INDEX, k], points[END, k]
         if j >= 0:

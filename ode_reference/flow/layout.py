@@ -45,7 +45,7 @@ _REAL: Final = (
     "largest_snap wronskian_error inertia_error watched_from initial final"
 )
 _WHOLE: Final = (
-    "origin drag_on_centre recoil sequential mirrored ledger free on_base on_cap near order struck released hits "
+    "origin drag_on_centre recoil mirrored ledger free on_base on_cap near order struck released hits "
     "steps impacts rests releases recorded status step_limit watch impact_limit"
 )
 
@@ -88,7 +88,6 @@ def prepare(
     """
     throw, n = Throw.of(scenario), scenario.n_slices
     gravity = 0.0 if switches.weightless else throw.gravity
-    sequential = settings["impact_law"] == "sequential" and switches.recoil
     stacked = type(scenario).initial_positions is Scenario.initial_positions  # else let go elsewhere than Eq. 3a says
     full = stacked and scenario.fill_fraction == 1.0 and not np.any(speeds)
     given = {
@@ -109,9 +108,8 @@ def prepare(
         "origin": switches.origin,
         "drag_on_centre": switches.drag_on_centre,
         "recoil": switches.recoil,
-        "sequential": sequential,
-        # Nothing tells the ends of a full bottle apart if no weight pulls along it and impacts do not come one by one.
-        "mirrored": full and gravity == 0.0 and not sequential,
+        # Nothing tells the ends of a full bottle apart if no weight pulls along it.
+        "mirrored": full and gravity == 0.0,
         "ledger": settings["energy"],
         "step_limit": STEP_LIMIT,
         "watch": WATCH,

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ode_reference import LADDER, LAWS, MODELS, Switches, messages, solve, solve_batch, witness
+from ode_reference import LADDER, MODELS, Switches, messages, solve, solve_batch, witness
 from ode_reference.combinations import acceleration_of
 from ode_reference.flow import api, layout
 from ode_reference.motion import Throw
@@ -25,7 +25,7 @@ HALF = Scenario().with_slices(20)
 
 
 def record_of(scenario, switches, free, on_base, on_cap):
-    flight, *_ = layout.prepare(scenario, switches, {"rest_speed": 1e-5, "impact_law": "", "energy": False})
+    flight, *_ = layout.prepare(scenario, switches, {"rest_speed": 1e-5, "energy": False})
     now = flight[0]
     now.free, now.on_base, now.on_cap = free, on_base, on_cap
     layout.set_body(now)
@@ -113,14 +113,13 @@ def test_the_plane_motion_of_free_flight_keeps_its_momentum_between_impacts(n):
     assert worst < 1e-12
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_momentum_is_kept_at_every_impact(law):
+def test_momentum_is_kept_at_every_impact():
     """Against C_M, a slice far from both ends has the same velocity just before and just after each impact."""
-    first = solve(HALF, "free-flight", impact_law=law)
+    first = solve(HALF, "free-flight")
     instants = np.unique(first.impacts.time)[:60]
     instants = instants[np.diff(instants, prepend=-1.0) > 1e-9]
     times = np.sort(np.concatenate([instants, instants + 1e-12]))
-    flight = solve(HALF, "free-flight", times, impact_law=law)
+    flight = solve(HALF, "free-flight", times)
     drift = HALF.slice_mass * flight.v.sum(axis=1) / HALF.total_mass
     against = flight.v - drift[:, None]
     inside = (flight.r > HALF.r_min + 1e-3) & (flight.r < HALF.r_max - 1e-3)
@@ -275,7 +274,7 @@ def test_a_flight_ends_after_the_greatest_number_of_impacts(method, monkeypatch)
     [(layout.WRONSKIAN, "A B' - A' B"), (layout.INERTIA, "J of the moments"), (layout.ESCAPED, "outside the bottle")],
 )
 def test_a_broken_check_says_which(status, words):
-    flight, *_ = layout.prepare(HALF, MODELS["eq8"].switches, {"rest_speed": 1e-5, "impact_law": "", "energy": False})
+    flight, *_ = layout.prepare(HALF, MODELS["eq8"].switches, {"rest_speed": 1e-5, "energy": False})
     now = layout.numbers_of(flight)
     now.status = status
     result = api.message(now, HALF, "eq8", solve(HALF).impacts)
@@ -326,13 +325,13 @@ def throws(count):
     ]
 
 
-@pytest.mark.parametrize(("model", "law"), [("eq8", "simultaneous"), ("free-flight", "sequential")])
-def test_a_batch_equals_single_runs_to_the_last_digit(model, law):
+@pytest.mark.parametrize("model", ["eq8", "free-flight"])
+def test_a_batch_equals_single_runs_to_the_last_digit(model):
     many = throws(30)
-    batch = solve_batch(many, model, impact_law=law, states=True, energy=True)
+    batch = solve_batch(many, model, states=True, energy=True)
     assert len(batch) == 30
     for k, throw in enumerate(many):
-        alone, result = solve(throw, model, impact_law=law, energy=True), batch[k]
+        alone, result = solve(throw, model, energy=True), batch[k]
         for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia"):
             np.testing.assert_array_equal(getattr(result, name), getattr(alone, name))
         np.testing.assert_array_equal(result.impacts.time, alone.impacts.time)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ode_reference import LADDER, LAWS, Switches
+from ode_reference import LADDER, Switches
 from slicemodel.scenario import Bottle, Scenario
 
 FILE = Path(__file__).resolve().parents[2] / "benchmarks" / "flow_agreement.py"
@@ -37,11 +37,10 @@ def assert_agree(agreement, case):
     return mine, theirs
 
 
-@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("model", LADDER)
-def test_every_rung_has_the_same_impacts(agreement, model, law):
+def test_every_rung_has_the_same_impacts(agreement, model):
     scenario = replace(Scenario(restitution=0.4, duration=0.25).with_slices(9), theta0=0.9)
-    mine, _ = assert_agree(agreement, agreement.Case(scenario, model, law))
+    mine, _ = assert_agree(agreement, agreement.Case(scenario, model))
     assert len(mine.impacts) >= 3
 
 
@@ -60,16 +59,15 @@ def test_every_restitution_has_the_same_impacts(agreement, model, e):
     assert_agree(agreement, agreement.Case(scenario, model))
 
 
-@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("n", [2, 5, 8])
 @pytest.mark.parametrize("drag", [0.0, 0.4])
-def test_a_full_bottle_has_the_same_impacts(agreement, n, drag, law):
+def test_a_full_bottle_has_the_same_impacts(agreement, n, drag):
     """Its ends are struck at one instant with speeds that are equal but for rounding, so that ties are decided alike.
 
     Then the two lists agree in the numbers of the slices too.
     """
     scenario = Scenario(water_mass=1.0, n_slices=n, drag=drag, restitution=0.6, duration=0.3)
-    case = agreement.Case(scenario, "free-flight", law)
+    case = agreement.Case(scenario, "free-flight")
     mine, theirs = assert_agree(agreement, case)
     assert agreement.first_parting(mine, theirs) == ""
     assert mine.diagnostics["opposite_hits"] == theirs.diagnostics["opposite_hits"]

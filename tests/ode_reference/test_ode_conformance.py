@@ -132,7 +132,6 @@ def test_a_run_in_which_time_stops_passing_is_stalled(monkeypatch):
         ({"model": "eq-8"}, ["model = 'eq-8'", "did you mean 'eq8'"]),
         ({"model": "zzz"}, ["known: published-limit, signs-limit, eq8-wall, eq8, eq8-weightless"]),
         ({"model": "switches:11000"}, ["model = 'switches:11000'", "recoil", "switches:110000"]),
-        ({"impact_law": "newton"}, ["impact_law = 'newton'", "known: simultaneous, sequential"]),
         ({"model": None}, ["model = None"]),
         ({"model": ["eq8"]}, ["model = ['eq8']"]),
         ({"method": "radau"}, ["method = 'radau'", "did you mean 'Radau'"]),

@@ -72,7 +72,6 @@ def test_rtol_decides_the_error():
         ("eq8", {"max_step": 1e-3}),
         ("eq8", {"rest_speed": 1e-3}),
         ("eq8", {"method": "RK45"}),
-        ("free-flight", {"impact_law": "sequential"}),
     ],
 )
 def test_every_setting_changes_the_result(model, changed):

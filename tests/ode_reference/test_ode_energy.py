@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ode_reference import LADDER, LAWS, solve
+from ode_reference import LADDER, solve
 from ode_reference.energy import WORKS
 from slicemodel.scenario import Scenario
 
@@ -25,11 +25,10 @@ def by_definition(scenario, r, v, omega):
     return axial + about * omega**2 / 2
 
 
-@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("model", LADDER)
-def test_ledger_closes_and_agrees_with_the_energy_by_definition(model, law):
+def test_ledger_closes_and_agrees_with_the_energy_by_definition(model):
     scenario = Scenario().with_slices(20)
-    flight = solve(scenario, model, impact_law=law, energy=True)
+    flight = solve(scenario, model, energy=True)
     ledger = flight.diagnostics["energy"]
     assert set(ledger) == {"initial", "final", "residual", *WORKS}
     assert abs(ledger["residual"]) < 1e-9 * ledger["initial"]
@@ -71,10 +70,9 @@ def test_what_the_ladder_mends_is_what_the_ledger_no_longer_books():
     assert booked[6] == set()
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_free_flight_without_loss_keeps_its_energy(law):
+def test_free_flight_without_loss_keeps_its_energy():
     scenario = Scenario(n_slices=12, drag=0.0, restitution=1.0)
-    flight = solve(scenario, "free-flight", impact_law=law, rest_speed=1e-8, energy=True)
+    flight = solve(scenario, "free-flight", rest_speed=1e-8, energy=True)
     ledger = flight.diagnostics["energy"]
     assert flight.ok
     assert len(flight.impacts) > 30

@@ -46,7 +46,7 @@ def flight_of(*polynomials, stop, parts=1, on_base=False):
     flight = _Flight(
         scenario,
         Model("made", "given", "A motion of our choice.", acceleration),
-        settings | {"impact_law": "simultaneous", "energy": False},
+        settings | {"energy": False},
         np.array([stop]),
     )
     start = [np.polynomial.Polynomial(p) for p in polynomials]

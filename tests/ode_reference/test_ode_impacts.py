@@ -1,4 +1,4 @@
-"""The two impact laws: against every possible active set, momentum, energy; and the contacts they end in."""
+"""The impact law: against every possible active set, momentum, energy; and the contacts they end in."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from ode_reference.contact import Ends, resolve
-from ode_reference.impacts import LAWS, sequential, simultaneous
+from ode_reference.impacts import simultaneous
 from ode_reference.models import MODELS
 from ode_reference.motion import Motion, Throw
 from slicemodel.scenario import Bottle, Scenario
@@ -39,7 +39,7 @@ def kinetic(x, side, tube, ratio):
 
 
 def assert_law_of_newton_and_moreau(x, side, e, ratio):
-    after, gained = simultaneous(x, side, e, ratio, 1e-3)
+    after, gained = simultaneous(x, side, e, ratio)
     solutions = by_enumeration(x, side, e, ratio)
     assert solutions
     for p in solutions:
@@ -83,57 +83,16 @@ def test_simultaneous_law_solves_every_complementarity_problem(contacts, e, rati
     assert_law_of_newton_and_moreau(x, side, e, ratio)
 
 
-@settings(max_examples=200, derandomize=True, deadline=None)
-@given(contacts=contacts, e=st.one_of(st.sampled_from([0.0, 1.0]), st.floats(0, 1)), ratio=st.floats(1e-3, 30.0))
-def test_sequential_law_ends_with_nothing_approaching_and_gains_no_energy(contacts, e, ratio):
-    x, side = map(np.array, zip(*contacts, strict=True))
-    after, gained = sequential(x, side, e, ratio, 1e-3)
-    assert np.all(after <= 0.0)
-    before = kinetic(x, side, 0.0, ratio)
-    assert kinetic(after, side, gained, ratio) <= before * (1 + 1e-9)
-    # Newton's third law, slice by slice: each impulse pushes, and together they move the tube.
-    impulse = side * (side * x - side * after - gained)
-    assert np.all(impulse >= -1e-9 * (1 + x.max()))
-    assert ratio * (side * impulse).sum() == pytest.approx(gained, rel=1e-8, abs=1e-9)
-
-
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_one_slice_alone_is_the_textbook_impact_by_either_law(law):
-    after, gained = law(np.array([2.0]), np.array([-1]), 0.5, 0.4, 1e-3)
+def test_one_slice_alone_is_the_textbook_impact():
+    after, gained = simultaneous(np.array([2.0]), np.array([-1]), 0.5, 0.4)
     assert after[0] == -1.0
     assert gained == pytest.approx(-2.0 * 1.5 / (1 + 1 / 0.4), rel=1e-15, abs=0.0)
 
 
-def test_the_laws_differ_when_one_slice_rests_on_the_base_and_another_strikes_the_cap():
-    x, side = np.array([0.0, 1.0]), np.array([1, -1])
-    together, _ = simultaneous(x, side, 0.5, 2.0, 1e-6)
-    in_turn, _ = sequential(x, side, 0.5, 2.0, 1e-6)
-    np.testing.assert_allclose(together, [0.0, -0.5], atol=1e-15)
-    # 1: the cap is struck, V = -1.5 * 2/3 = -1, the base comes at the resting slice with 1. 2: that one leaves at -0.5,
-    # V = +1, and the cap comes at the first one again, at 0.5. 3: that leaves at -0.25, V = -0.5: the base at 0. Done.
-    np.testing.assert_allclose(in_turn, [0.0, -0.25], atol=1e-15)
-
-
-def test_the_sequential_law_takes_the_fastest_approach_first():
-    # The cap at 2: V = -1, the base now comes at 2, and so on; the base first would end at (-0.375, -0.875).
-    after, gained = sequential(np.array([1.0, 2.0]), np.array([1, -1]), 0.5, 0.5, 1e-6)
-    np.testing.assert_allclose(after, [-1.0, 0.0], atol=1e-15)
-    assert gained == pytest.approx(0.0, abs=1e-15)
-
-
-def test_between_equally_fast_approaches_the_last_digit_does_not_choose():
-    side = np.array([1, -1])
-    exact, _ = sequential(np.array([1.0, 1.0]), side, 0.5, 2.0, 1e-6)
-    for x in ([1.0, 1.0 + 1e-15], [1.0 + 1e-15, 1.0], [1.0, 1.0 - 1e-12]):
-        after, _ = sequential(np.array(x), side, 0.5, 2.0, 1e-6)
-        np.testing.assert_allclose(after, exact, rtol=0, atol=1e-10)
-
-
-def test_elastic_exchange_conserves_energy_by_either_law():
+def test_elastic_exchange_conserves_energy():
     x, side = np.array([1.3, 0.0, 0.2]), np.array([1, -1, -1])
-    for law in LAWS.values():
-        after, gained = law(x, side, 1.0, 1.7, 1e-12)
-        assert kinetic(after, side, gained, 1.7) == pytest.approx(kinetic(x, side, 0.0, 1.7), rel=1e-12, abs=0.0)
+    after, gained = simultaneous(x, side, 1.0, 1.7)
+    assert kinetic(after, side, gained, 1.7) == pytest.approx(kinetic(x, side, 0.0, 1.7), rel=1e-12, abs=0.0)
 
 
 # ---------------------------------------------------------------------- the contacts of one instant
@@ -147,10 +106,9 @@ ENDS = Ends.of(SCENARIO, recoil=True)
     places=st.lists(st.sampled_from(["base", "cap", "inside", "on base", "on cap"]), min_size=5, max_size=5),
     speeds=st.lists(st.floats(1e-4, 3.0), min_size=5, max_size=5),
     e=st.sampled_from([0.0, 0.5, 1.0]),
-    law=st.sampled_from(sorted(LAWS)),
     seed=st.integers(0, 5),
 )
-def test_every_slice_that_touches_nothing_keeps_its_velocity_against_the_centre_of_mass(places, speeds, e, law, seed):
+def test_every_slice_that_touches_nothing_keeps_its_velocity_against_the_centre_of_mass(places, speeds, e, seed):
     """Momentum: what no end pushes goes on through the lab as before, though its r' jumps with the tube."""
     assume("inside" in places and {"base", "cap"} & set(places))
     motion = Motion(Throw.of(SCENARIO), MODELS["free-flight"], np.array(["on" in place for place in places]))
@@ -165,7 +123,7 @@ def test_every_slice_that_touches_nothing_keeps_its_velocity_against_the_centre_
     resting = np.where([p.startswith("on") for p in places], side, 0)
     v = np.where(resting != 0, 0.0, np.where(side != 0, side, 1) * np.array(speeds))
     out = resolve(
-        motion, np.concatenate([[0.0], r, v]), np.where(resting == 0, side, 0), resting, ENDS, e, 1e-2, LAWS[law]
+        motion, np.concatenate([[0.0], r, v]), np.where(resting == 0, side, 0), resting, ENDS, e, 1e-2, simultaneous
     )
 
     def in_frame_of_centre(v):
@@ -194,7 +152,7 @@ def test_slices_resting_on_both_ends_leave_or_stay_by_their_common_body():
     now = np.concatenate([[0.0, ENDS.high, ENDS.high, ENDS.high, ENDS.low, 0.72], np.zeros(5)])
 
     def resolved(y):
-        return resolve(motion, y, np.zeros(5, dtype=int), resting, ENDS, 0.5, 1e-3, LAWS["simultaneous"])
+        return resolve(motion, y, np.zeros(5, dtype=int), resting, ENDS, 0.5, 1e-3, simultaneous)
 
     np.testing.assert_array_equal(resolved(now).resting, resting)
     now[10] = -40.0  # its drag drags the tube toward the cap, away from nobody on the base

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ode_reference import LAWS, solve, solve_batch
+from ode_reference import solve, solve_batch
 from slicemodel import observables
 from slicemodel.observables import grazes
 from slicemodel.scenario import Bottle, Scenario
@@ -62,62 +62,53 @@ def test_rungs_without_recoil_converge_in_rtol_and_rest_speed_together(model, th
     assert change(model, THROWS[throw], (1e-10, 1e-5), (1e-11, 1e-6)) < band
 
 
-@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(("model", "throw"), cases(("free-flight",)))
-def test_free_flight_converges_within_its_band(model, throw, law):
-    moved = change(model, THROWS[throw], (1e-10, 1e-3), (1e-11, 3e-4), impact_law=law)
+def test_free_flight_converges_within_its_band(model, throw):
+    moved = change(model, THROWS[throw], (1e-10, 1e-3), (1e-11, 3e-4))
     # Of a single flight of this bottle 4e-3 has been seen: its late impacts hang on the last digits.
     assert moved < (5e-3 if throw == "other bottle 50" else BAND_WITH_RECOIL)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_the_mean_of_twins_converges_within_the_band_of_free_flight(law):
+def test_the_mean_of_twins_converges_within_the_band_of_free_flight():
     throw = THROWS["other bottle 50"]
     twins = [replace(throw, omega0=throw.omega0 * (1 + k * 1e-11)) for k in range(-20, 21)]
     times = np.linspace(0.0, throw.duration, 101)
-    means = [
-        solve_batch(twins, "free-flight", times, rest_speed=rest, impact_law=law).omega.mean(axis=0)
-        for rest in (1e-3, 3e-4)
-    ]
+    means = [solve_batch(twins, "free-flight", times, rest_speed=rest).omega.mean(axis=0) for rest in (1e-3, 3e-4)]
     assert np.abs(means[0] - means[1]).max() / abs(throw.omega0) < BAND_WITH_RECOIL
 
 
 @pytest.mark.arithmetic
 @pytest.mark.parametrize("settings", [{}, {"method": "DOP853", "rtol": 1e-12}], ids=["taylor", "DOP853"])
-@pytest.mark.parametrize(("law", "omega"), [("simultaneous", 7.47610762), ("sequential", 3.31509339)])
-def test_two_slices_tell_the_impact_laws_apart(law, omega, settings):
+def test_two_slices_follow_the_law_of_newton_and_moreau(settings):
+    """Impacts of one instant taken in turn, the fastest first, would end at 3.31509339 rad/s."""
     for rest_speed in (1e-3, 1e-6):
-        flight = solve(
-            Scenario(n_slices=2, drag=0.0), "free-flight", [0.3], impact_law=law, rest_speed=rest_speed, **settings
-        )
-        assert flight.omega[0] == pytest.approx(omega, abs=1e-7)
+        flight = solve(Scenario(n_slices=2, drag=0.0), "free-flight", [0.3], rest_speed=rest_speed, **settings)
+        assert flight.omega[0] == pytest.approx(7.47610762, abs=1e-7)
 
 
 @pytest.mark.arithmetic
-@pytest.mark.parametrize("law", LAWS)
-def test_free_flight_of_the_papers_throw_ends_where_the_engines_end(law):
+def test_free_flight_of_the_papers_throw_ends_where_the_engines_end():
     # A rigid-body engine, extrapolated to dt = 0 and converged in iterations, ends at 3.300 to 3.301 rad/s. One flight
     # ends at 3.2966 to 3.3012, by its last digits, and a rest speed of 1e-3 m/s takes 1e-3 rad/s off: the mean of twins
     # at a smaller one is what can be compared.
     twins = [replace(Scenario(), omega0=20 * (1 + k * 1e-11)).with_slices(50) for k in range(-20, 21)]
-    last = solve_batch(twins, "free-flight", [0.5], impact_law=law, rest_speed=1e-4).omega
+    last = solve_batch(twins, "free-flight", [0.5], rest_speed=1e-4).omega
     assert last.mean() == pytest.approx(3.3005, abs=1e-3)
     # After half of the impacts the flights are still the same, and so are the two methods: by then a change of omega_0
     # has grown four-hundredfold, and so has the error of a step.
     for method in ({}, {"method": "DOP853", "rtol": 1e-12}):
-        flight = solve(Scenario().with_slices(50), "free-flight", [0.15], **method, impact_law=law)
+        flight = solve(Scenario().with_slices(50), "free-flight", [0.15], **method)
         assert flight.omega[0] == pytest.approx(5.382677, abs=1e-6)
 
 
 FILLINGS = (0.1, 0.25, 0.5, 0.75, 1.0)
-PLATEAUS = {  # by equation, or by law of impact in free flight
+PLATEAUS = {
     "published-limit": (0.6199, 0.2818, 0.2889, 0.4072, 0.4162),
     "signs-limit": (0.7589, 0.2253, 0.2417, 0.3116, 0.4016),
     "eq8-wall": (0.7190, 0.1949, 0.3292, 0.3214, 0.3946),
     "eq8": (0.7921, 0.3337, 0.5203, 0.3913, 0.4021),
     "eq8-weightless": (0.8830, 0.2037, 0.1711, 0.2472, 0.3763),
-    "simultaneous": (0.8830, 0.2124, 0.1776, 0.2497, 0.3763),
-    "sequential": (0.8830, 0.2118, 0.1775, 0.2498, 0.3766),
+    "free-flight": (0.8830, 0.2124, 0.1776, 0.2497, 0.3763),
 }
 
 
@@ -130,10 +121,8 @@ def plateau(fill, model, **options):
 @pytest.mark.slow
 @pytest.mark.parametrize("model", PLATEAUS)
 def test_plateau_at_five_fillings(model):
-    recoils = model in LAWS
-    how = {"model": "free-flight", "impact_law": model} if recoils else {"model": model}
-    result = [plateau(fill, **how) for fill in FILLINGS]
-    np.testing.assert_allclose(result, PLATEAUS[model], rtol=0, atol=3e-3 if recoils else 5e-4)
+    result = [plateau(fill, model) for fill in FILLINGS]
+    np.testing.assert_allclose(result, PLATEAUS[model], rtol=0, atol=3e-3 if model == "free-flight" else 5e-4)
 
 
 @pytest.mark.parametrize("model", ["eq8-weightless", "free-flight"])

@@ -62,14 +62,6 @@ def test_a_full_bottle_stays_its_own_mirror_image_for_many_turns(method, n_slice
     assert np.abs(flight.r + flight.r[:, ::-1] - scenario.bottle.length).max() < 1e-13
 
 
-@pytest.mark.parametrize("method", ["taylor", "DOP853"])
-def test_the_sequential_law_breaks_the_symmetry_of_a_full_bottle(method):
-    """Of two slices that strike together the first one strikes first; both methods keep to that."""
-    scenario = full_bottle(6, 0.9, 0.0)
-    flight = solve(scenario, "free-flight", times=[0.5], impact_law="sequential", method=method)
-    assert abs(flight.r + flight.r[:, ::-1] - scenario.bottle.length).max() > 1e-3
-
-
 def test_instants_at_which_both_ends_are_struck_are_counted():
     def counted(times, ends):
         ones = np.ones(len(times))

@@ -62,7 +62,7 @@ SOURCES: Final = (
 TOGETHER: Final = {"ode_reference": 64, "slicemodel": 16, "": 8}
 """Points of a solver's package, or of a maker's own programs, that go to a worker together; of others, one."""
 
-SHARED: Final = {"times", "rest_speed", "impact_law", "energy"}
+SHARED: Final = {"times", "rest_speed", "energy"}
 """Settings that ``ode_reference.solve_batch`` takes; others are of its slower methods."""
 
 READ: Final = ("plateau", "omega_end", "theta_end", "r_cm_end", "t_end", "impacts", "status", "message", "reason")
