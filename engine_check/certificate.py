@@ -45,7 +45,7 @@ ORDERS: Final = (0.5, 2.5)
 """An order observed outside is none: the changes do not fall as a power of the step."""
 
 STATUSES: Final[Mapping[str, str]] = {
-    "certified": "every change is below the tolerance, and every rebound has the restitution asked for",
+    "certified": "every change is below the tolerance, and a single slice rebounds as asked",
     "not-converged": "the levels ended before; up to the horizon the changes are below the tolerance",
     "diverged": "a run left its bands at the last settings that were tried",
     "wrong-restitution": "the engine does not deliver the restitution asked for",

@@ -110,8 +110,8 @@ def measure_restitution(
 
     Accuracy
     --------
-    e_out within 1e-3 of e_in in pymunk at 1e-4 s: an impact that is answered at the next grid point keeps the
-    speeds on both sides of it.
+    e_out within 2e-5 of e_in in pymunk at 1e-4 s, for e from 0.25: an impact that is answered at the next grid point
+    keeps the speeds on both sides of it. With e = 0 a slice stays on the end and creeps into it at 0.0024 of its speed.
     """
     settings = {"slices": slices, **(knobs or {})}
     return tuple(_rebound(engine, end, e, settings) for end in ENDS for e in COEFFICIENTS)

@@ -221,6 +221,13 @@ def test_a_planted_mistake_is_remarked_and_named_where_it_is(mistake):
     assert words in MEASURES[name](Adapter(mistake, drop), 1e-3).remark
 
 
+def test_an_error_that_no_step_reduces_may_be_that_of_gravity():
+    """Its contact and its floor are exact."""
+    heavy = changed(gravity=lambda q: 1.02 * q["gravity"])
+    remark = MEASURES["order"](Adapter("heavy", heavy), 1e-3).remark
+    assert "not the step's, but that of gravity, damping" in remark
+
+
 def test_thresholds_are_measured():
     for least in (0.05, 1.0):
         made = MEASURES["restitution"](Adapter("threshold", threshold(least)), 1e-3)

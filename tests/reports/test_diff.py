@@ -245,6 +245,9 @@ def test_what_was_made_differently_is_said_first(sound, tmp_path, capsys):
     assert "are gone (2):" in lines
     assert "are new (1):" in lines
     assert compare_summaries(sound, other).changes[-1].id == "brand-new"
+    assert lines[-1].endswith("findings compared: no difference; 2 are gone; 1 is new")
+    other["findings"][0]["verdict"] = "fail"
+    assert compare_summaries(sound, other).conclusion.endswith("findings compared: 1 differs; 2 are gone; 1 is new")
 
 
 def test_another_version_alone_is_no_difference(sound):

@@ -541,7 +541,11 @@ def test_land_says_touch_laws_and_certificate(capsys):
     assert "ice touches at t = " in words
     assert words.count("event by event, ") == 2
     assert "assumed" in words
+    assert "it comes down flat, and which rim strikes first is rounding" in words
+    assert main(["land", "--slices", "4", "--height", "-0.3"]) == 0
+    words = capsys.readouterr().out
     assert "below the saddle" in words
+    assert "flat" not in words
 
 
 def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():

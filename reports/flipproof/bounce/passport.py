@@ -223,7 +223,7 @@ def time_of_hit(adapter: Adapter, dt: float) -> Measurement:
     if returns is None:
         return Measurement("time of hit", "an elastic hit was not returned", "an elastic hit was not returned")
     shift, delay, fast = returns
-    spread = float(np.ptp(fast) / dt)
+    spread, late = float(np.ptp(fast) / dt), float(fast.mean() / dt)
     remarks = []
     if not abs(shift) <= max(1e-4, dt):
         remarks.append(f"the floor lies {abs(shift) * 1e3:.2g} mm too {'high' if shift > 0 else 'low'}")
@@ -241,9 +241,10 @@ def time_of_hit(adapter: Adapter, dt: float) -> Measurement:
         location = f"the time of return changes with the phase of the step by {spread:.2g} steps"
     return Measurement(
         "time of hit",
-        f"{location}; a body is returned late by {fast.mean() / dt:.2g} steps on average, at 8 m/s",
+        f"{location}; a body is returned {'early' if late < 0.0 else 'late'} by {abs(late):.2g} steps on average, at 8 "
+        "m/s, by its last place and speed",
         "; ".join(remarks),
-        {"spread_steps": spread, "mean_steps": float(fast.mean() / dt), "floor_m": shift},
+        {"spread_steps": spread, "mean_steps": late, "floor_m": shift},
     )
 
 
@@ -304,7 +305,7 @@ def order(adapter: Adapter, dt: float) -> Measurement:
         remark = f"across impacts the error does not fall with the step: {errors[0]:.1e} m at {STEPS[0] * dt:g} s, "
         remark += f"{errors[-1]:.1e} m at {STEPS[-1] * dt:g} s"
         if max(errors) < 1.3 * min(errors):
-            remark += "; it is not the step's, but that of the contact or of the floor's place"
+            remark += "; it is not the step's, but that of gravity, damping, the contact or the floor's place"
     return Measurement(
         "order",
         f"1.2 s of a fall from 1 m with e = 0.7 end {errors[2]:.1e} m off at a step of {dt:g} s ({_order_text(slope)} "
@@ -322,7 +323,7 @@ def convergence(errors: list[float]) -> float:
 
 
 def _order_text(slope: float) -> str:
-    return "rounding alone" if math.isinf(slope) else f"order {slope:.1f}"
+    return "rounding alone" if math.isinf(slope) else f"order {round(slope, 1) + 0.0:.1f}"
 
 
 def rest(adapter: Adapter, dt: float) -> Measurement:

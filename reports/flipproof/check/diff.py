@@ -77,10 +77,16 @@ class Comparison:
 
     @property
     def conclusion(self) -> str:
-        """How many findings were compared, how many differ, and how many are not comparable."""
-        count, apart = len(self.differences), len(self.changes) - len(self.differences)
-        words = f"{self.compared} findings compared: " + (f"{count} differ" if count else "no difference")
-        return words + (f", {apart} not comparable" if apart else "")
+        """How many findings were compared, how many of them differ or are not comparable, how many are gone or new."""
+        kinds = Counter(change.kind for change in self.changes)
+        count = kinds["verdict"] + kinds["moved"] + kinds["words"]
+        words = f"{self.compared} findings compared: "
+        words += f"{count} differ{'s' if count == 1 else ''}" if count else "no difference"
+        words += f", {kinds['bandless']} not comparable" if kinds["bandless"] else ""
+        others = [
+            f"{kinds[kind]} {'is' if kinds[kind] == 1 else 'are'} {kind}" for kind in ("gone", "new") if kinds[kind]
+        ]
+        return "; ".join([words, *others])
 
     def to_mapping(self) -> dict[str, object]:
         """Return the comparison as JSON-ready data."""

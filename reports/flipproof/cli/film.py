@@ -191,14 +191,20 @@ def _shared_lines(draws: Mapping[str, Any], agreement: str) -> list[str]:
 
 def command_export(options: argparse.Namespace) -> int:
     """Run one solver and write cap, base and centre of mass in the lab, one row per frame."""
+    import numpy as np
+
     from flipproof.film.tracker.export import at_times, data_track_text, frame_times, until_landing
     from flipproof.frame.solvers import find, solve
     from flipproof.output.folder import write_text
+    from slicemodel.trajectory import output_times
 
     check_outputs(options, "out")
     scenario = read_scenario(options.scenario, options.slices)
     times = frame_times(scenario, options.frame_rate)
-    run = solve(find(options.solver).name, scenario)
+    solver = find(options.solver)
+    # A scheme has its own grid, between whose points frames are interpolated.
+    exact = {} if solver.package == "slicemodel" else {"times": np.union1d(output_times(scenario, None), times)}
+    run = solve(solver.name, scenario, **exact)
     if not run.ok:
         print(f"flipproof: {options.solver}: {run.status}: {run.message}", file=sys.stderr)
     frames = at_times(run, times[times <= run.t[-1]])

@@ -72,7 +72,7 @@ def add_landing(commands: Any) -> None:
     )  # fmt: skip
     upright.add_argument(
         "--scatter", type=scatter, metavar="SPIN,DEGREES,SPEED", help="standard deviations, not all 0: share of "
-        "omega_0, of theta_0 [degrees], of the launch velocity [m/s] (0.05,5,0.1)",
+        "omega_0, of theta_0 [degrees], of the upward launch velocity [m/s] (0.05,5,0.1)",
     )  # fmt: skip
     upright.add_argument("--seed", type=seed, default=1, metavar="N", help="seed of all throws (%(default)s)")
     upright.add_argument("--map", type=cells, default=(24, 24), metavar="CxR", help="cells of the map (24x24)")

@@ -30,8 +30,8 @@ class Growth(NamedTuple):
         if not math.isfinite(self.rate):
             return "no growth rate (too few points above round-off)"
         if not self.clear:
-            return f"does not clearly grow ({self.rate:.1f} ± {self.error:.1f} /s)"
-        return f"{'grows' if self.rate > 0 else 'shrinks'} at {abs(self.rate):.1f} ± {self.error:.1f} /s"
+            return f"no single rate of growth can be told ({self.rate:.1f} /s, standard error {self.error:.1f})"
+        return f"{'grows' if self.rate > 0 else 'shrinks'} at {abs(self.rate):.1f} /s (standard error {self.error:.1f})"
 
 
 def fit_growth(t: FloatArray, size: FloatArray, stop: float = math.inf) -> Growth:

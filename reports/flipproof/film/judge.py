@@ -15,9 +15,10 @@ from scipy.stats import gaussian_kde, norm
 from flipproof.film.estimate import DRAWS, MAX_RATE, SCALE, UNITS, Estimate, exchange_gain, shortest, third_differences
 from flipproof.film.fall import hand_share
 from flipproof.film.likelihood import GRAVITY
+from ode_reference.solver import WATERS
 from slicemodel.trajectory import FloatArray
 
-Verdict = Literal["told", "bounded above", "bounded below", "cannot tell"]
+Verdict = Literal["told", "bounded above", "bounded below", "cannot tell", "not in this equation"]
 
 INDISTINCT: Final = 3.0
 """Difference of the logarithms of evidence up to which two equations are said to do equally well."""
@@ -135,6 +136,18 @@ class Assessment:
         return f"{self.discrepancy:.2g}" if self.discrepancy >= limit else f"less than {limit:.1g}"
 
     @property
+    def unused(self) -> tuple[str, ...]:
+        """Parameters of other equations that this one does not have."""
+        if self.estimate.throw.frozen:
+            return ("gamma", "restitution")
+        return ("restitution",) if self.estimate.solver in WATERS else ()
+
+    @property
+    def sliced(self) -> bool:
+        """Whether the equation has slices, however many: ``WATERS`` have none, or infinitely many."""
+        return self.estimate.solver not in WATERS
+
+    @property
     def falls(self) -> bool:
         """Whether the fitted flight falls at about g; true if nothing shows how it falls."""
         estimate = self.estimate
@@ -152,6 +165,8 @@ class Assessment:
 
     def verdict(self, name: str) -> Verdict:
         """Return whether the data determine a parameter, bound it on one side, or do neither."""
+        if name in self.unused:
+            return "not in this equation"
         low, high = self.estimate.interval(name)
         if name == "restitution":
             if high - low > 0.6 or (low < 0.02 and high > 0.98):
@@ -177,10 +192,17 @@ class Assessment:
             )
         if len(self.residuals) < 8:
             clicked = int((estimate.flying & film.clicked.all(axis=0)).sum())
-            advice = "click more" if clicked < 8 else "look for an origin or a stick that moves, or exchanged ends"
+            total = int(film.clicked.all(axis=0).sum())
+            state = "frozen" if estimate.throw.frozen else "liquid"
+            advice = "look for an origin or a stick that moves, or exchanged ends"
+            if clicked < 8:
+                advice = (
+                    "click more frames of the flight, or see whether --scenario "
+                    f"({estimate.throw.fill_fraction:.0%} full, {state}) is this bottle"
+                )
             raise UnsoundError(
-                f"{film.label}: {len(self.residuals)} of {clicked} frames clicked in flight fit it; 8 are needed: "
-                f"{advice}"
+                f"{film.label}: {estimate.solver} fits {len(self.residuals)} of {total} clicked frames as a flight, of "
+                f"{clicked} that it takes for one; 8 are needed: {advice}"
             )
         if estimate.likelihood.planar:
             lasts = estimate.likelihood.touch - float(x[0])
@@ -210,8 +232,8 @@ class Assessment:
                 raise UnsoundError(
                     f"{film.label}: g = {gravity:.3g} m/s^2 in the picture, not {GRAVITY:g}: is the bottle that of "
                     f"--scenario ({estimate.throw.fill_fraction:.0%} full)? click the calibration stick again (lengths "
-                    f"{gravity / GRAVITY:.3g} times too long), or name the frame rate of the recording "
-                    f"(times {math.sqrt(GRAVITY / max(gravity, 1e-9)):.3g} times too long); y points up"
+                    f"are {gravity / GRAVITY:.3g} of the true ones), or name the recording's frame rate (times are "
+                    f"{math.sqrt(GRAVITY / max(gravity, 1e-9)):.3g} of the true ones); y points up"
                 )
             if self.noise > 0.1 * estimate.best["length"]:
                 raise UnsoundError(
@@ -245,9 +267,9 @@ class Assessment:
         if hand is not None and hand.falls:
             raise UnsoundError(
                 f"{estimate.film.label}: {1e3 * hand.seconds:.0f} ms before the release at {release:.3f} s the bottle "
-                "falls freely by its clicks alone: the flight begins earlier, and no fit was found that says so: is it "
-                f"the bottle of --scenario ({estimate.throw.fill_fraction:.0%} full)? click the frames there again, or "
-                "give --release"
+                "falls freely by its clicks alone: the flight begins earlier, and no fit was found that says so: does "
+                "the film begin after the release, or is it another bottle than that of --scenario "
+                f"({estimate.throw.fill_fraction:.0%} full)? click the frames there again, or give --release"
             )
 
     def _check_rates(self) -> None:
@@ -285,7 +307,8 @@ class Assessment:
         inside = self.estimate.flying
         doubted = sorted({int(film.lines[k]) for k in np.flatnonzero(estimate.doubted.any(axis=0))})
         lines = [
-            f"{estimate.solver}, {estimate.throw.n_slices} slices: {int(inside.sum())} frames in flight, "
+            f"{estimate.solver}{f', {estimate.throw.n_slices} slices' if self.sliced else ''}: "
+            f"{int(inside.sum())} frames in flight, "
             f"{int((inside & ~film.clicked.all(axis=0)).sum())} with a point missing, "
             + (f"clicks doubted in lines {', '.join(map(str, doubted))}" if doubted else "no click doubted")
         ]
@@ -305,14 +328,16 @@ class Assessment:
         )
         if abs(correlation) > 0.5 and estimate.likelihood.planar:
             lines.append(f"  correlation  gamma with release {correlation:+.2f}: their intervals hang together")
-        if not estimate.throw.frozen:
+        if self.sliced and not estimate.throw.frozen:
             lines.append(
                 f"  slices       {estimate.throw.n_slices}, held: no interval allows for another number (--slices)"
             )
         return [*lines, f"  residuals    {self.conclusion}"]
 
     def number(self, name: str) -> str:
-        """Return the median of a parameter, its interval and its unit."""
+        """Return the median of a parameter, its interval and its unit; a dash if the equation does not have it."""
+        if name in self.unused:
+            return "–"
         estimate = self.estimate
         low, high = estimate.interval(name)
         factor, unit = 1.0, UNITS[name]
@@ -330,7 +355,7 @@ class Assessment:
         return {
             "told": "", "cannot tell": "  the film cannot tell it",
             "bounded above": "  bounded from above only: 0 is not excluded",
-            "bounded below": "  bounded from below only",
+            "bounded below": "  bounded from below only", "not in this equation": "  not in this equation",
         }[verdict]  # fmt: skip
 
     @property

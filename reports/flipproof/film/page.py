@@ -102,7 +102,8 @@ def figure_allowed(assessments: Sequence[Assessment]) -> Figure:
             alpha=0.4, rasterized=True,
         )  # fmt: skip
         axes.set_xlabel("γ = α/2m [/s]")
-        axes.set_title(estimate.solver, fontsize=10, loc="left")
+        unused = "".join(f", without {name}" for name in assessment.unused)
+        axes.set_title(f"{estimate.solver}{unused}", fontsize=10, loc="left")
         axes.set_ylim(0, 1)
     grid[0][0].set_ylabel("restitution e [1]")
     return figure
@@ -125,10 +126,10 @@ def summary(assessments: Sequence[Assessment], provenance: Mapping[str, str]) ->
 
 def _fit(assessment: Assessment) -> dict[str, Any]:
     estimate = assessment.estimate
-    names = [name for name in SHOWN if name in estimate.draws]
+    names = [name for name in SHOWN if name in estimate.draws and name not in assessment.unused]
     return {
         "model": estimate.solver,
-        "slices": estimate.throw.n_slices,
+        "slices": estimate.throw.n_slices if assessment.sliced else None,
         "parameters": [
             {"name": name, "unit": UNITS[name], "value": estimate.best[name], "low": estimate.interval(name)[0],
              "high": estimate.interval(name)[1], "verdict": assessment.verdict(name)} for name in names

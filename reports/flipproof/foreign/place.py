@@ -114,7 +114,9 @@ class Place:
     def advice(self) -> str:
         """What to do, if nothing but the place is known; else empty."""
         lost = not (self.still or self.on_lattice)
-        return "look for another restitution, drag or mass than the throw's, or for other physics" if lost else ""
+        return (
+            "look for another restitution, drag, mass or gravity than the throw's, or for other physics" if lost else ""
+        )
 
     def to_mapping(self) -> dict[str, object]:
         """Return the place as JSON-ready data."""

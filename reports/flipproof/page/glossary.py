@@ -61,8 +61,8 @@ TERMS: Final[Mapping[str, str]] = {
     "band": "An estimate, not a bound, of how far a number could move by numerical causes alone: from eight flights "
     "whose release differs in the eleventh digit, or from finer settings.",
     "recoil": "The kick that the bottle gets when a slice strikes one of its ends.",
-    "certified": "Neither half the step nor twice the iterations moves ω by more than the tolerance, and "
-    "every rebound has the restitution asked for.",
+    "certified": "The last halving of the step, twice the iterations and a slightly heavier or lighter bottle move ω "
+    "by no more than the tolerance, and a single slice rebounds as asked.",
     "regression claim": "A statement that must hold in every report; if one fails, the report's exit status is 1.",
     "observation": "A number that is reported without a threshold; it cannot fail.",
     "ice": "Frozen water: no slice may move, so ω must stay constant.",

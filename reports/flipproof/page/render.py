@@ -48,10 +48,13 @@ def short(value: float | None) -> str:
     return str(value) if isinstance(value, int) else f"{value:.2g}"
 
 
-def restitution_error(certificate: Mapping[str, Any]) -> float | None:
-    """Return the largest |measured - asked| restitution of a certificate; None if none was measured."""
-    errors = [abs(r["measured"] - r["asked"]) for r in certificate["restitution"] if r["measured"] is not None]
-    return max(errors, default=None)
+def restitution_error(certificate: Mapping[str, Any], *, still: bool) -> float | None:
+    """Return the largest |measured - asked| restitution of a certificate, of e = 0 or of all other e; None without any.
+
+    What is measured with e = 0 is a slice that stays on the end: as it settles, it moves.
+    """
+    measured = [r for r in certificate["restitution"] if r["measured"] is not None and (r["asked"] == 0.0) == still]
+    return max((abs(r["measured"] - r["asked"]) for r in measured), default=None)
 
 
 def read_assets() -> dict[str, Markup]:

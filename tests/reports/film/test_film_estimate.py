@@ -227,7 +227,19 @@ def test_ice_tells_nothing_of_drag():
     film = Film(label="ice", t=made.t, values=turning[None, :, None], quantity="theta", lines=np.arange(len(made.t)))
     film = replace(film, values=film.values + np.random.default_rng(0).normal(0, 3e-3, film.values.shape))
     judged = Assessment(estimate(film, replace(THROW, frozen=True)))
-    assert judged.verdict("gamma") == judged.verdict("restitution") == "cannot tell"
+    assert judged.verdict("gamma") == judged.verdict("restitution") == "not in this equation"
+    assert judged.number("gamma") == "–"
+    assert "  restitution  –  not in this equation" in judged.lines()
+
+
+def test_rods_have_no_restitution_and_no_number_of_slices():
+    made = film_of(clip(6, fps=30))
+    judged = Assessment(estimate(made, THROW, "rods"))
+    lines = judged.lines()
+    assert lines[0].startswith("rods: ")
+    assert "  restitution  –  not in this equation" in lines
+    assert not any(line.startswith("  slices") for line in lines)
+    assert judged.verdict("gamma") == "told"
 
 
 @pytest.mark.slow

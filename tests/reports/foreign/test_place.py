@@ -78,7 +78,7 @@ def test_wrong_constants_of_another_solver_are_off_the_lattice(name):
     assert not found.on_lattice
     assert found.distance > 5 * found.room
     assert "off the lattice" in found.text
-    assert "restitution, drag or mass" in found.advice
+    assert "restitution, drag, mass or gravity" in found.advice
 
 
 @pytest.mark.parametrize("name", ["RestitutionLow", "DragFivePercent", "ElasticCap", "StickForEver"])
@@ -88,7 +88,7 @@ def test_wrong_constants_impacts_and_rests_are_off_the_lattice(name):
     assert (found.equation, found.on_lattice) in {("free-flight", False), ("switches:110011", False)}
     assert found.distance > 5 * found.room
     assert "off the lattice" in found.text
-    assert "restitution, drag or mass" in found.advice
+    assert "restitution, drag, mass or gravity" in found.advice
 
 
 def test_a_switch_without_effect_in_one_equation_explains_nothing():

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ode_reference
 from flipproof.cli.film import add_film
 from flipproof.film.clip import read_film
 from flipproof.film.tracker.reader import read_track_table
@@ -157,6 +158,15 @@ def test_export_lays_cap_base_and_centre_over_the_video(tmp_path):
     place = np.hypot(x_cm, y_cm) / 0.28
     assert place[0] == pytest.approx(0.8092, abs=1e-3)
     assert place.min() < 0.7
+
+
+def test_frames_of_an_equation_are_solved_and_not_interpolated(tmp_path):
+    path, throw = tmp_path / "flight.txt", Scenario().with_slices(5)
+    assert run("export", "--solver", "free-flight", "--slices", 5, "--frame-rate", 240, "--out", path) == 0
+    rows = np.loadtxt(path, skiprows=1)
+    flight = ode_reference.solve(throw, "free-flight", rows[:, 0].round(9).clip(0.0, throw.duration))
+    axis = (rows[:, 3:5] - rows[:, 1:3]) / throw.bottle.length
+    assert np.abs(axis[:, 0] * np.cos(flight.theta) + axis[:, 1] * np.sin(flight.theta)).max() < 1e-7
 
 
 def test_export_and_back(tmp_path):

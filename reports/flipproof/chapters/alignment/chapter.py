@@ -173,7 +173,8 @@ def figures(results: Pairs) -> Iterator[Exhibit]:
             title=f"Contacts and impacts: {first} and {second}",
             caption="One row per slice. Bars are contacts, triangles are impacts; the upper lane of a row is the first "
             "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
-            "contacts and impacts of that slice.",
+            "contacts and impacts of that slice. Impacts of a slice on an end are paired in order, with the smallest "
+            "sum of shifts.",
             alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. {alignment.words}.",
             maker=figure_gantt,
             data=(alignment,),

@@ -11,22 +11,27 @@ from flipproof.frame.solvers import Run, RunResult
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 
+SLICES: Final = 20
+"""Slices of the paper's own throw, on which the ledgers are checked."""
+
 
 class Energy(NamedTuple):
     """Every model's flight of the paper's own throw, and its ledger on the report's."""
 
     checks: Mapping[str, RunResult]
     ledgers: Mapping[str, Outcome[Mapping[str, float]]]
+    slices: int
 
 
 def study(ask: Ask) -> Study[Energy]:
     """Keep the ledger of every model, on both throws."""
-    throws = (ask.reference.with_slices(20), ask.throw.with_slices(20))
+    throws = (ask.reference.with_slices(SLICES), ask.throw)
     checks, runs = ({m: Run(m, throw, {"energy": True}, f"ledger, {m}") for m in LADDER} for throw in throws)
     flights = yield [*checks.values(), *runs.values()]
     return Energy(
         {model: flights[run] for model, run in checks.items()},
         {m: attempt(lambda run: flights[run].flight.diagnostics["energy"], run) for m, run in runs.items()},
+        ask.throw.n_slices,
     )
 
 
@@ -39,7 +44,7 @@ def claims(results: Energy) -> Claims:
         return regression(id_, title, missed, "of the initial energy", (0.0, 1e-9))
 
     for model, result in results.checks.items():
-        id_, title = f"energy-{model}", f"{model}: the energy ledger closes"
+        id_, title = f"energy-{model}", f"{model}: the energy ledger closes, N = {SLICES}"
         yield judged(closes, id_, title, result, id=id_, title=title)
     for model, outcome in results.ledgers.items():
         if outcome.result is None:
@@ -52,5 +57,5 @@ CHAPTER: Final = Chapter(
     study,
     claims,
     kind="regression",
-    page=lambda results: {"made": results_of(results.ledgers)},
+    page=lambda results: {"made": results_of(results.ledgers), "slices": results.slices},
 )

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 
 from flipproof.chapters.solvers import ENGINE
 from flipproof.curves.ensemble import claim_change, largest_change
+from flipproof.figures.spoken import spoken
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Run, RunResult, Study, judged
 from flipproof.frame.columns import rows_csv
@@ -50,6 +51,11 @@ class EngineFact:
     admissible: tuple[float, float]
     measure: Callable[[Mapping[str, RunResult]], tuple[float, str]]
 
+    @property
+    def title(self) -> str:
+        """The engine and what holds of it."""
+        return f"{spoken(self.engine)}: {WORDS[self.id]}"
+
     def finding(self, results: Mapping[str, RunResult]) -> Finding:
         """Return the finding: that the number lies in its interval, or why there is none.
 
@@ -63,7 +69,7 @@ class EngineFact:
             absent = self.engine != "pymunk"
         except Missing as missing:
             note = str(missing.args[0])
-        fact = regression(f"engine-fact-{self.id}", WORDS[self.id], value, self.unit, self.admissible, note)
+        fact = regression(f"engine-fact-{self.id}", self.title, value, self.unit, self.admissible, note)
         return replace(fact, kind="observation") if absent else fact
 
 

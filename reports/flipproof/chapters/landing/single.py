@@ -13,6 +13,9 @@ from slicemodel import Outcome, Scenario, Table, Touch
 from slicemodel.scenario import unknown_name
 from slicemodel.table import LAWS
 
+FLAT = 1e-6
+"""Tilt at the touch below which it is rounding that decides which rim strikes first [rad]."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
@@ -85,7 +88,8 @@ def describe(rows: Sequence[Row], table: Table) -> str:
             bottles.add(row.name)
             lines.append(_touch_line(row.name, row.touch))
         program = "event by event" if row.program == REFERENCE else row.program
-        lines.append(f"  {program if row.law is None else f'{program}, {row.law}':34} {_how(row.outcome)}")
+        landing = _how(row.outcome, flat=abs(row.touch.tilt) < FLAT)
+        lines.append(f"  {program if row.law is None else f'{program}, {row.law}':34} {landing}")
     return "\n".join(lines)
 
 
@@ -101,9 +105,14 @@ def _touch_line(name: str, touch: Touch) -> str:
     )
 
 
-def _how(outcome: Outcome) -> str:
+def _how(outcome: Outcome, *, flat: bool) -> str:
     if not outcome.decided:
         return f"undecided: {outcome.reason}"
+    if flat:
+        return (
+            f"{outcome.outcome}; it comes down flat, and which rim strikes first is rounding: when it is certain, how "
+            "often it bounces and where its base comes to stand are chance"
+        )
     assert outcome.certified is not None
     assert outcome.margin is not None
     assert outcome.slid is not None

@@ -188,7 +188,8 @@ class LandingStudy:
         return (
             f"assumed: e_table = {self.size.restitution:g}, friction {self.size.friction:g}, scatter "
             f"{100 * scatter.spin:g} % in omega_0, {math.degrees(scatter.angle):g} degrees in theta_0, "
-            f"{scatter.speed:g} m/s in the launch velocity; {_cuts_words(self.size.cuts)} slices"
+            f"{scatter.speed:g} m/s in the upward launch velocity, none in the horizontal one; "
+            f"{_cuts_words(self.size.cuts)} slices"
         )
 
 
