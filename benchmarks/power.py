@@ -29,7 +29,7 @@ from flipproof.foreign.contract import Answer, Ask, ForeignError
 BLIND: Final = (
     "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh",
     "twelfth", "thirteenth", "fourteenth", "fifteenth", "sixteenth", "seventeenth", "eighteenth", "nineteenth",
-    "twentieth", "twentyfirst",
+    "twentieth", "twentyfirst", "twentysecond",
 )  # fmt: skip
 """Lists by people who had not seen the checks."""
 
@@ -52,7 +52,7 @@ MISSED: Final = (
     "kick_drift_hit_at_mid_step_speed", "angle_rk4_sticks_early", "frozen_grid_never_lies",
     "single_midpoint_compensation_added", "kick_drift_stopped_momentum_lost", "series_weak_pushes_hold_nothing",
     "adams_pece_history_across_release", "abm_impact_at_step_end", "hamilton_reports_past_impact",
-    "hamilton_first_in_the_list",
+    "hamilton_first_in_the_list", "newmark_reports_last_tick",
 )  # fmt: skip
 """Mistakes known to be missed."""
 

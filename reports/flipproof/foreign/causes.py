@@ -168,16 +168,18 @@ def _common_restitution(intervals: Sequence[Interval]) -> str:
 
 def _restitution_cause(intervals: Sequence[Interval]) -> str:
     """Return with what restitution slices leave the end that they strike, for each one that was asked for."""
+    if not any(i.v[1][i.hits[0][0]] for i in intervals):
+        return "the slice that strikes stays on its end"
     measured: dict[float, list[float]] = {}
     for i in intervals:
-        index = i.hits[0][0]
-        if abs(i.expected["v"][index]) > 1e-6:
-            share = float(i.v[1][index] / i.expected["v"][index])
-            measured.setdefault(i.throw.restitution, []).append(share * i.throw.restitution)
-    if measured and not any(any(values) for values in measured.values()):
-        return "the slice that strikes stays on its end"
+        (index, end, _), e = i.hits[0], i.throw.restitution
+        # What moves a slice after the impact moves it alike in both.
+        excess = end * float(i.expected["v"][index] - i.v[1][index]) / max(i.speeds[0], 1e-300)
+        if i.speeds[0] > 1e-6:
+            measured.setdefault(e, []).append(e + excess)
     ends = {e: np.quantile(values, (0.2, 0.8)) for e, values in measured.items()}
-    narrow = [e for e, (low, high) in sorted(ends.items()) if high - low < 0.1 * abs(high)]
+    # One impact alone may have a cause of its own.
+    narrow = [e for e, (low, high) in sorted(ends.items()) if len(measured[e]) > 1 and high - low < 0.1 * abs(high)]
     if not narrow:
         return "the slice that strikes leaves with another speed"
     wrong = [e for e in narrow if abs(np.median(measured[e]) - e) > max(0.003 * e, 2.0 * float(np.ptp(ends[e])))]
@@ -318,6 +320,9 @@ DRAG_OF_EQ8: Final = "the drag, alpha (v - v_CM) / m"
 DRAG_OF_FREE_FLIGHT: Final = "the drag, alpha v / m + alpha sum(v) / M_c"
 """Terms that are all of an equation's drag."""
 
+COEFFICIENT: Final = ": look at alpha / m, twice the damping rate"
+"""Advice on a drag that counts otherwise wherever slices fly."""
+
 WEIGHT_OF_ITS_OWN: Final = "cos(theta), in m/s^2,"
 """Term of a throw without gravity."""
 
@@ -379,7 +384,7 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
             if best[1] == ("the drag alpha mean(v) / m",) and abs(best[2][0] - (1.0 - share)) < 0.02:
                 return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
             if best[1] in ((DRAG_OF_EQ8,), (DRAG_OF_FREE_FLIGHT,)):
-                return f"{best[1][0]}, counts {1.0 - best[2][0]:.2g} times: look at alpha / m, twice the damping rate"
+                return f"{best[1][0]}, counts {1.0 - best[2][0]:.2g} times{COEFFICIENT}"
             if best[1] == (WEIGHT_OF_ITS_OWN,) and best[2][0] > 0.0:
                 return f"slices weigh as if g were {best[2][0]:.3g} m/s^2 where it is 0: take gravity from the throw"
             parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))

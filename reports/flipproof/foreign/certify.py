@@ -18,6 +18,7 @@ from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits
 from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
+from slicemodel import Scenario
 from slicemodel.scenario import unknown_name
 
 PASSED: Final = "passed"
@@ -294,22 +295,32 @@ def _answered_without(recorder: _Recorder) -> str:
             return False
         return True
 
-    condition, name = "", ""
+    def restless(throw: Scenario) -> Ask:
+        return replace(ask, scenario=replace(throw, restitution=1.0), start=elsewhere.far_from_ends(throw))
+
+    condition = ""
+    names: tuple[str, ...] = ()
     with suppress(WaitingError):
         if not answered(bare):
             if answered(replace(bare, start=elsewhere.far_from_ends(throw))):
-                condition, name = "with every slice far from the ends", "rests"
-        elif answered(replace(ask, scenario=replace(throw, gravity=0.0))):
-            condition, name = "without weight", "weight"
-        elif answered(replace(ask, scenario=replace(throw, drag=0.0))):
-            condition, name = "without drag", "drag"
+                condition, names = "with every slice far from the ends", ("rests",)
+            return _look_at(condition, names)
+        others = {"weight": replace(throw, gravity=0.0), "drag": replace(throw, drag=0.0)}
+        name = next((name for name, other in others.items() if answered(replace(ask, scenario=other))), "")
+        without = name and f"without {name}, and with it "
+        if answered(restless(throw if name else replace(throw, gravity=0.0, drag=0.0))):
+            condition, names = f"{without}as long as no slice rests", ("rests",)
         elif answered(shortened):
-            elastic = replace(ask, scenario=replace(throw, gravity=0.0, drag=0.0, restitution=1.0))
-            if answered(replace(elastic, start=elsewhere.far_from_ends(throw))):
-                condition, name = "as long as no slice rests", "rests"
-            else:
-                condition, name = "up to the first impact", "impacts"
-    return name and f"; the same is answered {condition}: look at {elsewhere.LOOK_AT[name]}"
+            condition, names = f"{without}up to the first impact", ("impacts", *filter(None, [name]))
+        elif name:
+            condition, names = f"without {name}", (name,)
+    return _look_at(condition, names)
+
+
+def _look_at(condition: str, names: tuple[str, ...]) -> str:
+    """Return under what condition an ask is answered, and what to look at; empty if none is known."""
+    parts = ", or at ".join(elsewhere.LOOK_AT[name] for name in names)
+    return parts and f"; the same is answered {condition}: look at {parts}"
 
 
 def _coverage(results: Iterable[Result]) -> Result:

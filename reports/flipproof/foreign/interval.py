@@ -33,6 +33,7 @@ class Interval:
     theta, omega, r, v : arrays, shapes (2,), (2,), (2, N), (2, N) - what the solver answers; SI units
     expected : mapping - by field what the equation gives at the second output
     hits : tuple of (slice, end, time) - impacts in the equation
+    speeds : tuple of float - the speed of each before it, relative to the bottle [m/s]
     before, after : array, shape (N,) - end on which each slice rests at either output in the equation, or 0
     departure : mapping
         By field the largest difference from ``expected``, a fraction of its scale; for omega, from what the angular
@@ -49,6 +50,7 @@ class Interval:
     v: FloatArray
     expected: Mapping[str, FloatArray]
     hits: tuple[tuple[int, int, float], ...]
+    speeds: tuple[float, ...]
     before: FloatArray
     after: FloatArray
     departure: Mapping[str, float]
@@ -131,6 +133,7 @@ def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[I
                 hits=tuple(
                     zip(*(getattr(flight.impacts, name).tolist() for name in ("slice", "end", "time")), strict=True)
                 ),
+                speeds=tuple(flight.impacts.speed_before.tolist()),
                 before=_resting(throw, places, v[0], 2 * rest_speed),
                 after=_resting(throw, expected["r"], expected["v"], 0.0),
                 departure={name: min(float(value), 1e3) for name, value in difference.items()},  # its square is finite

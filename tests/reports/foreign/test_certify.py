@@ -720,6 +720,8 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("lagrange_recoil_of_all", "definitions", "look at the recoil, and at what a slice that comes to rest"),
         ("gauss_inertia_in_units_of_water", "definitions", "J counts 0.947 times as a whole"),
         ("gauss_output_on_the_chord", "order-before-impacts", "look at how an answer between two steps is made"),
+        ("bulirsch_mean_of_movers", "piecewise", "the velocity that v is measured against while slices rest"),
+        ("bulirsch_slack_in_metres", "piecewise", "and at tolerances of its own"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
@@ -740,6 +742,8 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
                 ("angle_rk4_impact_at_an_angle", "elsewhere", "impacts not: look at how the answer is put together"),
                 ("extrapolator_no_restitution_is_a_half", "elsewhere", "and the tube recoils, as if e were 0.49 where"),
                 ("angle_rk4_about_middle", "equation", "look at the centrifugal term omega^2 (r - r_cm)"),
+                ("magnus_squares_e", "piecewise", "leaves as if e were 0.25 where it is 0.5, and the others"),
+                ("bulirsch_impacts_at_step_end", "piecewise", "how the time of an impact is found"),
             )
         ),
     ],
@@ -787,6 +791,17 @@ def test_what_is_answered_far_from_the_ends_alone_points_to_rests():
 
     (shape,) = certify(InProcess(Stuck(), "x"), ["shape"]).results
     assert "the same is answered with every slice far from the ends: look at rests" in shape.line
+
+
+def test_a_rest_that_weight_spoils_is_no_matter_of_the_weight():
+    class Chattering(Subject):
+        def solve(self, ask):
+            if ask.scenario.gravity and ask.scenario.restitution < 1.0:
+                raise ForeignError("the step became too small")
+            return super().solve(ask)
+
+    (shape,) = certify(InProcess(Chattering(), "x"), ["shape"]).results
+    assert "answered without weight, and with it as long as no slice rests: look at rests" in shape.line
 
 
 @pytest.mark.parametrize(
