@@ -115,7 +115,7 @@ def test_the_gallery_has_fact_number_threshold_and_sign(facts):
     }
     findings = tuple(changed[fact.id] for fact in FACTS)
     texts = [text.get_text() for text in figure_gallery(findings).axes[0].texts]
-    assert {"engine", "fact", "number", "threshold", "✓", "✗", "–", "≤ 1e-09", "-0.500 steps"} <= set(texts)
+    assert {"fact", "number", "threshold", "✓", "✗", "–", "≤ 1e-09", "-0.500 steps"} <= set(texts)
     (exhibit,) = figures((findings[0], findings))
     assert "10 of 12" in exhibit.caption
     assert "-0.500 steps, threshold 0.49 to 0.51, fail" in exhibit.alt

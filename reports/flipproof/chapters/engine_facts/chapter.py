@@ -357,7 +357,7 @@ def figures(results: EngineFacts) -> Iterator[Exhibit]:
     held = sum(finding.verdict == "pass" for finding in findings)
     unit = "[unit of the row]"
     rows = [
-        (fact.engine, f.title, f.value, f.unit or "1", *map(finite_or_none, f.admissible), f.verdict)
+        (fact.engine, WORDS[fact.id], f.value, f.unit or "1", *map(finite_or_none, f.admissible), f.verdict)
         for fact, f in zip(FACTS, findings, strict=True)
     ]
     yield Exhibit(
@@ -377,10 +377,10 @@ def figures(results: EngineFacts) -> Iterator[Exhibit]:
 
 @styled
 def figure_gallery(findings: Sequence[Finding]) -> Figure:
-    """Table of the findings of ``FACTS``: engine, fact, number, threshold, sign."""
-    columns = {"engine": 0.0, "fact": 0.1, "number": 0.66, "threshold": 0.8, "": 0.955}
+    """Table of the findings of ``FACTS``: fact, number, threshold, sign."""
+    columns = {"fact": 0.0, "number": 0.66, "threshold": 0.8, "": 0.955}
     signs = {"pass": ("✓", "#0B6E4F"), "fail": ("✗", "#B00020")}
-    texts = [textwrap.wrap(finding.title, 66) for finding in findings]
+    texts = [textwrap.wrap(finding.title, 76) for finding in findings]
     lines = sum(len(text) for text in texts) + 0.6 * len(texts) + 1.6
     figure, axes = new_figure(size=(8.0, 0.2 * lines + 0.1))
     axes.set_axis_off()
@@ -388,10 +388,10 @@ def figure_gallery(findings: Sequence[Finding]) -> Figure:
     for heading, x in columns.items():
         axes.text(x, 0.9, heading, fontsize=9, fontweight="bold", va="center")
     top = 1.5
-    for fact, finding, text in zip(FACTS, findings, texts, strict=True):
+    for finding, text in zip(findings, texts, strict=True):
         axes.axhline(top, color="#cccccc", linewidth=0.8)
         middle = top + 0.3 + len(text) / 2
-        cells = (fact.engine, "\n".join(text), finding.value_text, finding.threshold_text)
+        cells = ("\n".join(text), finding.value_text, finding.threshold_text)
         for x, cell in zip(columns.values(), cells, strict=False):
             axes.text(x, middle, cell, fontsize=8.5, va="center", linespacing=1.25, color="black")
         sign, colour = signs.get(finding.verdict, ("–", "#666666"))
