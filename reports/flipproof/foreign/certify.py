@@ -309,7 +309,8 @@ def _answered_without(recorder: _Recorder) -> str:
         name = next((name for name, other in others.items() if answered(replace(ask, scenario=other))), "")
         without = name and f"without {name}, and with it "
         if answered(restless(throw if name else replace(throw, gravity=0.0, drag=0.0))):
-            condition, names = f"{without}as long as no slice rests", ("rests",)
+            # An elastic impact is another one, too: what the weight or the drag lets begin may be either.
+            condition, names = f"{without}as long as no slice rests", ("rests", "impacts") if name else ("rests",)
         elif answered(shortened):
             condition, names = f"{without}up to the first impact", ("impacts", *filter(None, [name]))
         elif name:
