@@ -81,6 +81,20 @@ def test_matlab(audit):
     assert "overflow at t = 0.301 s" in audit["matlab-reset"].note
 
 
+def test_main_m_as_printed_stops_at_a_comment():
+    printed = programs.erratum_matlab_comment()
+    assert (printed.verdict, printed.number.value) == ("erratum", 1.0)
+    assert "density of water" in printed.note
+    for right in (
+        "rho =1000; %density of water",
+        "h=0.14; %height",
+        "r_CM=[];",
+        "rho =1000;",
+        "CheckBoundaryConditions(r)",
+    ):
+        assert programs.erratum_matlab_comment(right).verdict == "as printed"
+
+
 def test_the_square_is_judged_for_both_meanings_of_n(audit):
     assert "N_t, the number of time intervals, the exponent is 1.97 and the sentence right" in audit["matlab-cost"].note
     assert "the exponent is 1.00 and the sentence wrong too" in audit["python-cost"].note

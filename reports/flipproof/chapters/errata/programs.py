@@ -46,14 +46,24 @@ def erratum_matlab_reset() -> Erratum:
     )
 
 
-def erratum_matlab_comment() -> Erratum:
-    """Quote the comment of Main.m that lacks its percent sign; it calls no function of the supplement."""
+def erratum_matlab_comment(line: str = "rho =1000; density of water") -> Erratum:
+    """Show that Main.m as printed stops at a comment without its percent sign; ``line`` is exactly as printed.
+
+    A statement is stray if it assigns nothing and calls no function of the supplement.
+    """
+    functions = (
+        "FindCenterOfMass", "InertiaMomentumWater", "InertiaMomentumBottle", "InstantaneousAngularFrequency",
+        "FindTheta", "FindNewlocation", "CheckBoundaryConditions",
+    )  # fmt: skip
+    statements = (part.strip() for part in line.split("%")[0].split(";"))
+    named = (part for part in statements if part and "=" not in part)
+    stray = [part for part in named if part.partition("(")[0] not in functions]
     return Erratum(
         place="Supplement, Main.m",
-        prints="rho =1000; density of water",
+        prints=line,
         follows="a comment starts with %, as on the lines around it",
-        number=Number(1.0, "statements that nothing defines", (0.0, 0.0)),
-        note="MATLAB takes “density of water” for a call and stops: the program as printed cannot run",
+        number=Number(float(len(stray)), "statements that nothing defines", (0.0, 0.0)),
+        note=f"MATLAB takes “{stray[0]}” for a call and stops: the program as printed cannot run" if stray else "",
     )
 
 
