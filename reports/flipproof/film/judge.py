@@ -140,7 +140,7 @@ class Assessment:
         """Parameters of other equations that this one does not have."""
         if self.estimate.throw.frozen:
             return ("gamma", "restitution")
-        return ("restitution",) if self.estimate.solver in WATERS else ()
+        return () if self.sliced else ("restitution",)
 
     @property
     def sliced(self) -> bool:
@@ -462,6 +462,8 @@ def compared(assessments: Sequence[Assessment]) -> str:
 def shared_draws(films: Sequence[Assessment]) -> tuple[dict[str, FloatArray], str]:
     """Return draws of gamma and e shared by several films of one bottle, and in words whether these agree.
 
+    One that the equation does not have is left out.
+
     The films' posteriors of (gamma, e), as kernel density estimates, are multiplied: all have the same flat prior, and
     all other parameters are a film's own.
     """
@@ -483,4 +485,5 @@ def shared_draws(films: Sequence[Assessment]) -> tuple[dict[str, FloatArray], st
     differ = max(interval[0] for interval in gamma_intervals) > min(interval[1] for interval in gamma_intervals)
     note = "their intervals of gamma do not meet: not one bottle, or not this equation" if differ else "the films agree"
     shared = drawn + (rng.random(drawn.shape) - 0.5) * step
-    return {"gamma": shared[0], "restitution": np.clip(shared[1], 0.0, 1.0)}, note
+    draws = {"gamma": shared[0], "restitution": np.clip(shared[1], 0.0, 1.0)}
+    return {name: values for name, values in draws.items() if name not in films[0].unused}, note

@@ -240,6 +240,7 @@ def test_rods_have_no_restitution_and_no_number_of_slices():
     assert "  restitution  –  not in this equation" in lines
     assert not any(line.startswith("  slices") for line in lines)
     assert judged.verdict("gamma") == "told"
+    assert set(shared_draws([judged, judged])[0]) == {"gamma"}
 
 
 @pytest.mark.slow
