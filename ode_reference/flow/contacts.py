@@ -79,7 +79,7 @@ def meet(now, points, marks, impacts):
     at_rest = now.wall * (now.on_base - now.on_cap)
     now.y_cm = now.slice_mass * (now.free * now.y_mean + at_rest) / now.total_mass
     before = speeds_of(now, points, marks)
-    now.dy_mean -= simultaneous(now, points, now.restitution)
+    now.dy_mean -= simultaneous(now, points)
     for k in range(now.hits):
         j, end = marks[INDEX, k], points[END, k]
         if j >= 0:

@@ -17,7 +17,7 @@ MAX_PIECES = 200
 
 
 @inner
-def simultaneous(now, points, e):
+def simultaneous(now, points):
     """Write ``AFTER`` from the approach speeds by the law of Newton and Moreau; return V.
 
     With p_i = m max(0, (1 + e) x_i - s_i V) and V = sum s_i p_i / M_b, a slice that is pushed leaves at -e x_i, and
@@ -27,7 +27,7 @@ def simultaneous(now, points, e):
 
     which rises and is linear between the corners s_i (1 + e) x_i: Newton's step from the piece of the zero is exact.
     """
-    gained, low, high = 0.0, -math.inf, math.inf
+    e, gained, low, high = now.restitution, 0.0, -math.inf, math.inf
     for _ in range(MAX_PIECES):
         total = pushed = 0.0
         for k in range(now.hits):

@@ -241,8 +241,8 @@ def time_of_hit(adapter: Adapter, dt: float) -> Measurement:
         location = f"the time of return changes with the phase of the step by {spread:.2g} steps"
     return Measurement(
         "time of hit",
-        f"{location}; a body is returned {'early' if late < 0.0 else 'late'} by {abs(late):.2g} steps on average, at 8 "
-        "m/s, by its last place and speed",
+        f"{location}; a body is returned {'early' if late < 0.0 else 'late'} by {abs(late):.2g} steps on average, "
+        "at 8 m/s, by its last place and speed",
         "; ".join(remarks),
         {"spread_steps": spread, "mean_steps": late, "floor_m": shift},
     )

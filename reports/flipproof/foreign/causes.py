@@ -16,10 +16,11 @@ from slicemodel.observables import centre_of_mass
 from slicemodel.trajectory import FloatArray
 
 
-def cause_of(intervals: Sequence[Interval], *, recoil: bool) -> str:
+def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = False) -> str:
     """Return why a solver departs in these intervals, as a phrase; empty if that is not known.
 
-    ``recoil`` says whether an impact moves the tube in its equation.
+    ``recoil`` says whether an impact moves the tube in its equation, ``seldom`` whether few of the intervals with drag
+    depart.
     """
     still = [i.time for i in intervals if np.ptp(i.theta) == 0.0]
     if len(still) > 0.8 * len(intervals):
@@ -38,7 +39,7 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool) -> str:
         return (
             _inertia_cause(throws[0])
             or _advance_cause(throws[0])
-            or next(filter(None, map(_motion_cause, (intervals, *throws))), "")
+            or next(filter(None, (_motion_cause(some, seldom=seldom) for some in (intervals, *throws))), "")
             or _place_cause(intervals)
             or _slice_cause(intervals)
         )
@@ -172,10 +173,10 @@ def _restitution_cause(intervals: Sequence[Interval]) -> str:
         return "the slice that strikes stays on its end"
     measured: dict[float, list[float]] = {}
     for i in intervals:
-        (index, end, _), e = i.hits[0], i.throw.restitution
-        # What moves a slice after the impact moves it alike in both.
-        excess = end * float(i.expected["v"][index] - i.v[1][index]) / max(i.speeds[0], 1e-300)
-        if i.speeds[0] > 1e-6:
+        (index, end, _), speed, e = i.hits[0], i.speeds[0], i.throw.restitution
+        if speed > 1e-6:
+            # What moves a slice after the impact moves it alike in both.
+            excess = end * float(i.expected["v"][index] - i.v[1][index]) / speed
             measured.setdefault(e, []).append(e + excess)
     ends = {e: np.quantile(values, (0.2, 0.8)) for e, values in measured.items()}
     # One impact alone may have a cause of its own.
@@ -320,15 +321,15 @@ DRAG_OF_EQ8: Final = "the drag, alpha (v - v_CM) / m"
 DRAG_OF_FREE_FLIGHT: Final = "the drag, alpha v / m + alpha sum(v) / M_c"
 """Terms that are all of an equation's drag."""
 
-COEFFICIENT: Final = ": look at alpha / m, twice the damping rate"
-"""Advice on a drag that counts otherwise wherever slices fly."""
-
 WEIGHT_OF_ITS_OWN: Final = "cos(theta), in m/s^2,"
 """Term of a throw without gravity."""
 
 
-def _motion_cause(intervals: Sequence[Interval]) -> str:
-    """Return the extra terms in the acceleration of flying slices, if one to three explain it."""
+def _motion_cause(intervals: Sequence[Interval], *, seldom: bool) -> str:
+    """Return the extra terms in the acceleration of flying slices, if one to three explain it.
+
+    A drag that ``seldom`` counts otherwise has the right coefficient.
+    """
     if (field := _only_field(intervals)) not in ("", "v"):
         return f"{field} alone is off"
     flying = _undisturbed(intervals)
@@ -384,7 +385,11 @@ def _motion_cause(intervals: Sequence[Interval]) -> str:
             if best[1] == ("the drag alpha mean(v) / m",) and abs(best[2][0] - (1.0 - share)) < 0.02:
                 return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
             if best[1] in ((DRAG_OF_EQ8,), (DRAG_OF_FREE_FLIGHT,)):
-                return f"{best[1][0]}, counts {1.0 - best[2][0]:.2g} times{COEFFICIENT}"
+                return f"{best[1][0]}, counts {1.0 - best[2][0]:.2g} times" + (
+                    " there: look at the velocity that v is measured against while slices rest"
+                    if seldom
+                    else ": look at alpha / m, twice the damping rate"
+                )
             if best[1] == (WEIGHT_OF_ITS_OWN,) and best[2][0] > 0.0:
                 return f"slices weigh as if g were {best[2][0]:.3g} m/s^2 where it is 0: take gravity from the throw"
             parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))

@@ -312,7 +312,7 @@ def _answered_without(recorder: _Recorder) -> str:
             # An elastic impact is another one, too: what the weight or the drag lets begin may be either.
             condition, names = f"{without}as long as no slice rests", ("rests", "impacts") if name else ("rests",)
         elif answered(shortened):
-            condition, names = f"{without}up to the first impact", ("impacts", *filter(None, [name]))
+            condition, names = f"{without}up to the first impact", ("impacts", name) if name else ("impacts",)
         elif name:
             condition, names = f"without {name}", (name,)
     return _look_at(condition, names)

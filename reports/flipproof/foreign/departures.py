@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.foreign.causes import COEFFICIENT, cause_of, delay, rms, time_cause
+from flipproof.foreign.causes import cause_of, delay, rms, time_cause
 from flipproof.foreign.checking import NotApplicableError, effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.interval import FLOOR, Interval, intervals_of
@@ -340,16 +340,15 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
     outside = f", in {total - common or 'none'} of the {len(intervals) - count} others" if category else ""
     where = f"in {common} of {count} intervals between two outputs{category and ' ' + category}{outside}"
     departed = [interval for interval, chosen in zip(intervals, members & departs, strict=True) if chosen]
-    cause = cause_of(departed, recoil=switches_of(equation).recoil)
-    if look_at == "drag" and 3 * common < count:  # a wrong coefficient would show wherever slices fly
-        cause = cause.replace(COEFFICIENT, " there: look at the velocity that v is measured against while slices rest")
+    seldom = 3 * common < count  # a wrong term would show wherever it acts
+    cause = cause_of(departed, recoil=switches_of(equation).recoil, seldom=seldom and look_at == "drag")
     if look_at == "impacts on rests" and "recoil" in cause:
         cause = ""  # other impacts recoil rightly
     if "look at" in cause or (cause and look_at in ("weight", "drag", "odd")):  # the terms are named
         look_at = ""
     if look_at in ("weight", "drag") and (
         (outside and 5 * (total - common) * count > common * (len(intervals) - count))  # it happens without it, too
-        or 3 * common < count  # or seldom with it
+        or seldom
     ):
         look_at = ""
     advice = f"look at {LOOK_AT[look_at]}" if look_at else ""

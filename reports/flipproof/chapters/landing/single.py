@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import ode_reference
 from flipproof.chapters.landing.throws import SPARE
@@ -13,7 +14,7 @@ from slicemodel import Outcome, Scenario, Table, Touch
 from slicemodel.scenario import unknown_name
 from slicemodel.table import LAWS
 
-FLAT = 1e-6
+FLAT: Final = 1e-6
 """Tilt at the touch below which it is rounding that decides which rim strikes first [rad]."""
 
 
