@@ -1,4 +1,4 @@
-"""The event-driven landing against closed forms; symbols as in docs/landing.md."""
+"""The event-driven landing against closed forms; symbols as in ``landing_forms``."""
 
 import math
 from dataclasses import replace
