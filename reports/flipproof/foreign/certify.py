@@ -15,6 +15,7 @@ import numpy as np
 from flipproof.foreign import checks_basic, checks_measured, elsewhere
 from flipproof.foreign.checking import Check, NotApplicableError, Observation, drive
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
+from flipproof.foreign.likeness.mistakes import naming
 from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
@@ -60,6 +61,11 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
 
 A new check is one generator and one line here.
 """
+
+OF_MOTION: Final = frozenset(
+    ("piecewise", "angular-momentum", "angle", "restitution", "equation", "gravity", "mirror", "elsewhere")
+)
+"""Checks that may fail because of a known mistake in Eq. 8; if one gives the same answers, their advice names it."""
 
 ENOUGH: Final = "enough"
 """The last line of the whole suite: whether at least half of the checks could run."""
@@ -184,6 +190,7 @@ class _Recorder(Runner):
         self.answers: dict[tuple[Any, ...], Answer] = {}
         self.unanswered: Ask | None = None
         self.explained = False
+        self.named: str | None = None
         self.domain: dict[str, tuple[float, float]] = {}
 
     def __call__(self, ask: Ask) -> Answer:
@@ -265,11 +272,22 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
         return result(verdict=FAILED, observation=observation, reason=f"declared as a failure ({reason}), but holds")
     if observation.holds:
         return result(verdict=WEAK if observation.weak else PASSED, observation=observation)
+    if name in OF_MOTION and (named := _named(traits, recorder)):
+        observation = replace(observation, advice=f"it answers like a solver in which {named}")
     return result(
         verdict=FAILED if reason is None else EXPECTED,
         observation=observation,
         reason=f"known: {reason}" if reason else "",
     )
+
+
+def _named(traits: Traits, recorder: _Recorder) -> str:
+    """Return the known mistake with which a solver answers, empty if there is none; looked for once per solver."""
+    if recorder.named is None:
+        recorder.named = ""
+        with suppress(WaitingError):  # nobody is asked to write more answers for an advice
+            recorder.named = drive(naming(traits), recorder)
+    return recorder.named
 
 
 def _answered_without(recorder: _Recorder) -> str:

@@ -1,0 +1,1 @@
+"""Which known mistake in Eq. 8 gives a solver's answers: every one of a table is flown and compared."""

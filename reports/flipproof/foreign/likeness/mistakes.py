@@ -1,0 +1,214 @@
+"""Known mistakes in Eq. 8, and which of them gives a solver's answers.
+
+A mistake is named if its flight is the solver's on every one of ``THROWS``, within the solver's own error, and that of
+Eq. 8 is not. The throws differ in slices, restitution, drag, weight and start, so that two mistakes seldom agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from flipproof.foreign.checking import effort_of
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
+from flipproof.foreign.elsewhere import WHOLE, TextGenerator
+from flipproof.foreign.likeness.flight import CAP, MEAN, MIDDLE, Mistake, fly
+from flipproof.foreign.place import name_of, switches_of
+from slicemodel import Scenario
+from slicemodel.trajectory import FloatArray
+
+THROWS: Final = (
+    replace(WHOLE, start="scattered", theta0=0.7, angle=12.0),
+    replace(WHOLE, slices=3, start="scattered", filling=0.3, restitution=0.8, damping=3.0, theta0=-1.0, gravity=15.0),
+    replace(
+        WHOLE, slices=5, start="partly on the ends", restitution=0.3, damping=2.0, theta0=-2.0, omega0=-8.0, angle=13.0
+    ),
+    replace(WHOLE, slices=6, start="scattered", restitution=0.1, damping=20.0, gravity=12.0, theta0=-0.5, omega0=12.0),
+)
+"""Throws with weight, drag, impacts and rests on both ends."""
+
+LEVELS: Final = (1, 2)
+"""Levels of refinement; their difference is the solver's own error."""
+
+FLOOR: Final = 1e-5
+"""Room of omega beyond three times the solver's own error, fraction of omega_0."""
+
+CLEAR: Final = 0.02
+"""Largest room at which omega is compared."""
+
+UNREFINED: Final = 1e-3
+"""Own error of a solver that cannot be refined."""
+
+FAR: Final = 10.0
+"""Rooms by which Eq. 8 must be off at least where a mistake is named."""
+
+Factors = Mapping[str, float]
+
+MISTAKES: Final[Mapping[str, Factors | Callable[[Scenario], Factors]]] = {
+    "drag is missing": {"drag": 0.0},
+    "drag drives slices instead of slowing them": {"drag": -1.0},
+    "drag is taken against the tube instead of C_M": {"reference": 0.0},
+    "drag is taken against mean(v) instead of v_CM": lambda s: {"reference": s.total_mass / s.water_mass},
+    "drag is taken against minus v_CM": {"reference": -1.0},
+    "v_CM leaves out the mass of slices at rest": {"flying_alone": 1.0},
+    "v_CM takes the mean velocity of the flying slices for that of all": {"flying_alone": 2.0},
+    "alpha is divided by the mass of all the water instead of a slice's": lambda s: {"drag": 1.0 / s.n_slices},
+    "alpha is not divided by the mass of a slice": lambda s: {"drag": s.slice_mass},
+    "a slice weighs M_w / (N + 1)": lambda s: {"slice_mass": s.n_slices / (s.n_slices + 1)},
+    "a slice weighs M_w / (N - 1)": lambda s: {"slice_mass": s.n_slices / (s.n_slices - 1)},
+    "the weight is missing": {"cosine": 0.0},
+    "the weight has the wrong sign": {"cosine": -1.0},
+    "the weight goes with sin(theta)": {"cosine": 0.0, "sine": 1.0},
+    "the weight goes with -sin(theta)": {"cosine": 0.0, "sine": -1.0},
+    "the weight keeps the angle of release": {"angle_kept": 1.0},
+    "the centrifugal term takes omega_0 for omega": {"spin_kept": 1.0},
+    "the centrifugal term has the wrong sign": {"centrifugal": -1.0},
+    "slices are thrown away from mean(r) instead of r_CM": {"thrown_from": MEAN},
+    "slices are thrown away from L/2 instead of r_CM": {"thrown_from": MIDDLE},
+    "slices are thrown away from the cap instead of r_CM": {"thrown_from": CAP},
+    "the bottle's share is left out of r_CM": {"tube_in_centre": 0.0},
+    "r_CM is mean(r)": lambda s: {"tube_in_centre": 0.0, "water_in_centre": s.total_mass / s.water_mass},
+    "the bottle's share of r_CM is eps L instead of eps L / 2": {"tube_in_centre": 2.0},
+    "slices at rest are left out of r_CM": {"resting_in_centre": 0.0},
+    "slices at rest are left out of J": {"resting_in_inertia": 0.0},
+    "the water is left out of J": {"water_in_inertia": 0.0},
+    "M_b (L/2 - r_CM)^2 is left out of J": {"shifted": 0.0},
+    "the bottle's own M_b (R^2/2 + L^2/12) is left out of J": {"own_length": 0.0, "own_radius": 0.0},
+    "M_b R^2/2 is left out of J": {"own_radius": 0.0},
+    "M_b L^2/12 is left out of J": {"own_length": 0.0},
+    "J has M_b R^2/4 instead of M_b R^2/2": {"own_radius": 0.5},
+    "J has M_b R^2 instead of M_b R^2/2": {"own_radius": 2.0},
+    "J has M_b L^2/3 instead of M_b L^2/12": {"own_length": 4.0},
+    "J takes the slices about mean(r) instead of r_CM": {"moments_about": MEAN},
+    "J takes the slices about L/2 instead of r_CM": {"moments_about": MIDDLE},
+    "J takes the slices about the cap instead of r_CM": {"moments_about": CAP},
+    "the bottle has no mass": {"bottle": 1e-9},
+    "an impact multiplies the speed by e^2": {"e_power": 2.0},
+    "an impact multiplies the speed by the root of e": {"e_power": 0.5},
+    "every impact is elastic": {"e_power": 0.0},
+    "a slice stays on the end that it strikes": {"e_base": 0.0, "e_cap": 0.0},
+    "a slice stays on the base that it strikes": {"e_base": 0.0},
+    "a slice stays on the cap that it strikes": {"e_cap": 0.0},
+    "impacts on the base are elastic": lambda s: {"e_base": 1.0 / s.restitution},
+    "impacts on the cap are elastic": lambda s: {"e_cap": 1.0 / s.restitution},
+    "a slice rests at its first impact if its end presses it": {"rests_if_pressed": 1.0},
+    "a slice at rest is never let go": {"let_go_base": 0.0, "let_go_cap": 0.0},
+    "a slice at rest on the base is never let go": {"let_go_base": 0.0},
+    "a slice at rest on the cap is never let go": {"let_go_cap": 0.0},
+    "a slice at rest is let go by a push without its weight": {"push_weight": 0.0},
+    "a slice at rest is let go by a push without drag, alpha v_CM / m": {"push_drag": 0.0},
+    "slices turn at 0 and L instead of h/2N before": {"ends": 0.0},
+    "slices turn h/N before the tube's ends instead of h/2N": {"ends": 2.0},
+    "slice 0 never moves": {"still": 0.0},
+    "the last slice never moves": lambda s: {"still": s.n_slices - 1.0},
+}
+"""What is wrong -> factors and switches, which may depend on the throw; the words follow "it answers like a solver in which"."""
+
+SLOW: Final[Mapping[str, str]] = {
+    "a slice rests as soon as it leaves an end slower than about {:.1g} L omega_0": "rest_speed",
+    "an impact slower than about {:.1g} L omega_0 does not rebound": "least_speed",
+}
+"""What is wrong at low speeds -> the switch that holds the speed; the same in m/s is another mistake."""
+
+SPEEDS: Final = np.geomspace(3e-3, 0.5, 16)
+"""Speeds tried [L omega_0], or in m/s."""
+
+FITTED: Final[Mapping[str, tuple[str, ...]]] = {
+    "the drag counts {:.3g} times": ("drag",),
+    "v_CM counts {:.3g} times in the drag": ("reference",),
+    "the weight counts {:.3g} times": ("cosine",),
+    "the centrifugal term counts {:.3g} times": ("centrifugal",),
+    "the bottle weighs {:.3g} of M_b": ("bottle",),
+    "the bottle counts {:.3g} times in r_CM": ("tube_in_centre",),
+    "the water counts {:.3g} times in r_CM": ("water_in_centre",),
+    "the bottle's own M_b (R^2/2 + L^2/12) counts {:.3g} times in J": ("own_length", "own_radius"),
+    "M_b L^2/12 counts {:.3g} times in J": ("own_length",),
+    "M_b (L/2 - r_CM)^2 counts {:.3g} times in J": ("shifted",),
+    "the slices count {:.3g} times in J": ("water_in_inertia",),
+    "an impact multiplies the speed by {:.3g} e": ("e_base", "e_cap"),
+    "an impact on the base multiplies the speed by {:.3g} e": ("e_base",),
+    "an impact on the cap multiplies the speed by {:.3g} e": ("e_cap",),
+    "slices turn {:.3g} x h/2N before the tube's ends": ("ends",),
+}
+"""What is wrong by a factor, the same on every throw -> what the factor stands before."""
+
+GRID: Final = np.concatenate([[-1.0, -0.5, 0.0], np.geomspace(0.1, 8.0, 40)])
+"""Factors tried first; the best one is refined."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Flown:
+    """omega of a solver on one throw, and its room, both fractions of omega_0, at the times at which it is clear."""
+
+    ask: Ask
+    omega: FloatArray
+    room: FloatArray
+
+    def excess(self, factors: Factors | Callable[[Scenario], Factors]) -> float:
+        """Return by how many rooms the flight with a mistake is off at most."""
+        chosen = factors(self.ask.scenario) if callable(factors) else factors
+        omega = fly(self.ask, Mistake(**chosen)) / abs(self.ask.scenario.omega0)
+        off = np.abs(omega[: len(self.omega)] - self.omega) / self.room
+        return float(np.max(np.nan_to_num(off, nan=1e9), initial=0.0))
+
+
+def naming(traits: Traits) -> TextGenerator:
+    """Return the mistake with which a solver of Eq. 8 answers, or two that agree; empty if no known one does."""
+    try:
+        if traits.equation is None or name_of(switches_of(traits.equation)) != "eq8":
+            return ""
+    except ValueError:
+        return ""
+    flown = []
+    for knobs in THROWS:
+        ask = knobs.ask(0)
+        levels = LEVELS[::-1] if traits.refined_by else (0,)
+        with suppress(ForeignError):
+            answers = yield [replace(ask, effort=effort_of(traits, ask.scenario, level)) for level in levels]
+            flown.append(_flown(traits, ask, answers))
+    if len(flown) < 2 or not max(one.excess({}) for one in flown) > FAR:
+        return ""
+    named = [words for words, factors in MISTAKES.items() if _explains(flown, factors)]
+    named = named or [text for words, field in SLOW.items() if (text := _slow(flown, words, field))]
+    named = named or [text for words, fields in FITTED.items() if (text := _fitted(flown, words, fields))]
+    return " or ".join(named[:2])
+
+
+def _flown(traits: Traits, ask: Ask, answers: Sequence[Answer]) -> _Flown:
+    spin, fine = abs(ask.scenario.omega0), answers[0].omega
+    own = np.maximum.accumulate(np.abs(fine - answers[1].omega)) / spin if answers[1:] else UNREFINED
+    room = np.broadcast_to(max(FLOOR, 64 * traits.epsilon) + 3.0 * own, fine.shape)
+    clear = int(np.sum(np.logical_and.accumulate(room <= CLEAR)))
+    return _Flown(ask, fine[:clear] / spin, room[:clear])
+
+
+def _explains(flown: Sequence[_Flown], factors: Factors | Callable[[Scenario], Factors]) -> bool:
+    """Return whether a mistake leads to the answers on all throws."""
+    return all(one.excess(factors) <= 1.0 for one in flown)
+
+
+def _slow(flown: Sequence[_Flown], words: str, field: str) -> str:
+    """Return below which speed a mistake leads to the answers on all throws; empty with none."""
+    for speed in SPEEDS.tolist():
+        if _explains(flown, {field: speed}):
+            return words.format(speed)
+        if _explains(flown, lambda s, v=speed: {field: v / (s.bottle.length * abs(s.omega0))}):
+            return words.replace("L omega_0", "m/s").format(speed)
+    return ""
+
+
+def _fitted(flown: Sequence[_Flown], words: str, fields: Sequence[str]) -> str:
+    """Return with what factor before some fields a mistake leads to the answers on all throws; empty with none."""
+
+    def off(factor: float) -> float:
+        return max(one.excess(dict.fromkeys(fields, factor)) for one in flown)
+
+    best = int(np.argmin([off(factor) for factor in GRID]))
+    ends = GRID[max(0, best - 1)], GRID[min(len(GRID) - 1, best + 1)]
+    fit = minimize_scalar(off, bounds=ends, method="bounded", options={"xatol": 1e-10})
+    return words.format(fit.x) if fit.fun <= 1.0 else ""
