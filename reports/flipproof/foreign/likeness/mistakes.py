@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
@@ -23,14 +22,14 @@ from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
 THROWS: Final = (
-    replace(WHOLE, start="scattered", theta0=0.7, angle=12.0),
     replace(WHOLE, slices=3, start="scattered", filling=0.3, restitution=0.8, damping=3.0, theta0=-1.0, gravity=15.0),
+    replace(WHOLE, start="scattered", theta0=0.7, angle=12.0),
     replace(
         WHOLE, slices=5, start="partly on the ends", restitution=0.3, damping=2.0, theta0=-2.0, omega0=-8.0, angle=13.0
     ),
     replace(WHOLE, slices=6, start="scattered", restitution=0.1, damping=20.0, gravity=12.0, theta0=-0.5, omega0=12.0),
 )
-"""Throws with weight, drag, impacts and rests on both ends."""
+"""Throws with weight, drag, impacts and rests on both ends; the first one has six impacts."""
 
 LEVELS: Final = (1, 2)
 """Levels of refinement; their difference is the solver's own error."""
@@ -41,7 +40,7 @@ FLOOR: Final = 1e-5
 CLEAR: Final = 0.02
 """Largest room at which omega is compared."""
 
-UNREFINED: Final = 1e-3
+UNREFINED: Final = 1e-4
 """Own error of a solver that cannot be refined."""
 
 FAR: Final = 10.0
@@ -107,7 +106,7 @@ MISTAKES: Final[Mapping[str, Factors | Callable[[Scenario], Factors]]] = {
     "slice 0 never moves": {"still": 0.0},
     "the last slice never moves": lambda s: {"still": s.n_slices - 1.0},
 }
-"""What is wrong -> factors and switches, which may depend on the throw; the words follow "it answers like a solver in which"."""
+"""What is wrong -> factors and switches, which may depend on the throw; the words end "like a solver in which"."""
 
 SLOW: Final[Mapping[str, str]] = {
     "a slice rests as soon as it leaves an end slower than about {:.1g} L omega_0": "rest_speed",
@@ -138,7 +137,13 @@ FITTED: Final[Mapping[str, tuple[str, ...]]] = {
 """What is wrong by a factor, the same on every throw -> what the factor stands before."""
 
 GRID: Final = np.concatenate([[-1.0, -0.5, 0.0], np.geomspace(0.1, 8.0, 40)])
-"""Factors tried first; the best one is refined."""
+"""Factors tried first."""
+
+ZOOMS: Final = 6
+"""Times that the interval about the best factor is divided into 14 parts."""
+
+SPAN: Final = 1e-3
+"""Fraction of a factor within which the first throw alone finds it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,12 +154,15 @@ class _Flown:
     omega: FloatArray
     room: FloatArray
 
-    def excess(self, factors: Factors | Callable[[Scenario], Factors]) -> float:
-        """Return by how many rooms the flight with a mistake is off at most."""
+    def off(self, factors: Factors | Callable[[Scenario], Factors]) -> FloatArray:
+        """Return by how many rooms the flight with a mistake is off at each time."""
         chosen = factors(self.ask.scenario) if callable(factors) else factors
         omega = fly(self.ask, Mistake(**chosen)) / abs(self.ask.scenario.omega0)
-        off = np.abs(omega[: len(self.omega)] - self.omega) / self.room
-        return float(np.max(np.nan_to_num(off, nan=1e9), initial=0.0))
+        return np.nan_to_num(np.abs(omega[: len(self.omega)] - self.omega) / self.room, nan=1e9)
+
+    def excess(self, factors: Factors | Callable[[Scenario], Factors]) -> float:
+        """Return the largest number of rooms by which the flight with a mistake is off."""
+        return float(np.max(self.off(factors), initial=0.0))
 
 
 def naming(traits: Traits) -> TextGenerator:
@@ -194,21 +202,41 @@ def _explains(flown: Sequence[_Flown], factors: Factors | Callable[[Scenario], F
 
 def _slow(flown: Sequence[_Flown], words: str, field: str) -> str:
     """Return below which speed a mistake leads to the answers on all throws; empty with none."""
+
+    def in_metres(speed: float) -> Callable[[Scenario], Factors]:
+        return lambda s: {field: speed / (s.bottle.length * abs(s.omega0))}
+
     for speed in SPEEDS.tolist():
         if _explains(flown, {field: speed}):
             return words.format(speed)
-        if _explains(flown, lambda s, v=speed: {field: v / (s.bottle.length * abs(s.omega0))}):
+        if _explains(flown, in_metres(speed)):
             return words.replace("L omega_0", "m/s").format(speed)
     return ""
 
 
 def _fitted(flown: Sequence[_Flown], words: str, fields: Sequence[str]) -> str:
-    """Return with what factor before some fields a mistake leads to the answers on all throws; empty with none."""
+    """Return with what factor before some fields a mistake leads to the answers on all throws; empty with none.
 
-    def off(factor: float) -> float:
-        return max(one.excess(dict.fromkeys(fields, factor)) for one in flown)
+    It is searched on the first throw, which has few impacts, and narrowed down on all of them if one explains that.
+    """
+    factor = 1.0
+    for some, grid in ((flown[:1], GRID), (flown, 1.0 + SPAN * np.linspace(-1.0, 1.0, 15))):
+        factor = _nearest(some, fields, factor * grid)
+        if not _explains(some, dict.fromkeys(fields, factor)):
+            return ""
+    return words.format(factor)
 
-    best = int(np.argmin([off(factor) for factor in GRID]))
-    ends = GRID[max(0, best - 1)], GRID[min(len(GRID) - 1, best + 1)]
-    fit = minimize_scalar(off, bounds=ends, method="bounded", options={"xatol": 1e-10})
-    return words.format(fit.x) if fit.fun <= 1.0 else ""
+
+def _nearest(flown: Sequence[_Flown], fields: Sequence[str], grid: FloatArray) -> float:
+    """Return the factor whose flights are nearest to the answers: the best of a grid, which is divided ``ZOOMS`` times.
+
+    Late in a flight a factor must be right to many digits: the logarithm lets the beginning lead to them.
+    """
+    for _ in range(ZOOMS):
+        distances = [
+            sum(float(np.mean(np.log1p(one.off(dict.fromkeys(fields, factor))))) for one in flown)
+            for factor in grid.tolist()
+        ]
+        best = int(np.argmin(distances))
+        grid = np.linspace(grid[max(0, best - 1)], grid[min(len(grid) - 1, best + 1)], 15)
+    return float(grid[7])

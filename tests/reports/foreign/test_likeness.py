@@ -1,0 +1,140 @@
+"""A mistake in Eq. 8 is named by its own flights: held to the reference, and to mistakes that others planted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import InProcess, patches
+
+import ode_reference
+from flipproof.foreign.certify import certify
+from flipproof.foreign.checking import drive
+from flipproof.foreign.contract import started
+from flipproof.foreign.likeness.flight import Mistake, fly
+from flipproof.foreign.likeness.mistakes import FAR, FITTED, FLOOR, MISTAKES, SLOW, THROWS, naming
+
+
+def flown(ask, factors):
+    return fly(ask, Mistake(**(factors(ask.scenario) if callable(factors) else factors)))
+
+
+class Likened:
+    """A solver whose omega is that of a mistake; theta is its integral to the second order."""
+
+    equation = "eq8"
+    refined_by = "dt"
+
+    def __init__(self, factors):
+        self.factors = factors
+
+    def solve(self, ask):
+        omega = flown(ask, self.factors)
+        steps = np.diff(ask.times, prepend=0.0)
+        theta = ask.scenario.theta0 + np.cumsum(steps * (omega + np.roll(omega, 1)) / 2)
+        return {"t": ask.times, "theta": theta, "omega": np.nan_to_num(omega)}
+
+
+class Thrown:
+    """The reference, thrown with another scenario than the one asked."""
+
+    equation = "eq8"
+    refined_by = "dt"
+
+    def __init__(self, change):
+        self.change = change
+
+    def solve(self, ask):
+        throw = started(ask)
+        flight = ode_reference.solve(replace(throw, **self.change(throw)), "eq8", ask.times)
+        return {"t": ask.times, "theta": flight.theta, "omega": flight.omega}
+
+
+def named(solver):
+    runner = InProcess(solver, "x")
+    return drive(naming(runner.traits), runner)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("knobs", THROWS)
+def test_a_flight_without_a_mistake_is_eq8(knobs):
+    ask = knobs.ask(0)
+    exact = ode_reference.solve(started(ask), "eq8", ask.times)
+    assert np.max(np.abs(fly(ask, Mistake()) - exact.omega)) < 1e-8 * abs(ask.scenario.omega0)
+    assert len(exact.impacts.time) >= 5
+
+
+@pytest.mark.parametrize("words", MISTAKES)
+def test_each_mistake_is_told_from_eq8_and_from_all_but_one_other(words):
+    asks = [knobs.ask(0) for knobs in THROWS]
+    own = [flown(ask, MISTAKES[words]) for ask in asks]
+
+    def rooms(factors):
+        distances = [
+            np.nanmax(np.abs(omega - flown(ask, factors))) / (FLOOR * abs(ask.scenario.omega0))
+            for ask, omega in zip(asks, own, strict=True)
+        ]
+        return max(distances)
+
+    assert rooms({}) > FAR
+    assert len([other for other, factors in MISTAKES.items() if not rooms(factors) > 1.0]) <= 2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: {"drag": 0.37 * s.drag}, "the drag counts 0.37 times"),
+        (lambda s: {"gravity": 1.2 * s.gravity}, "the weight counts 1.2 times"),
+        (lambda s: {"restitution": s.restitution**2}, "an impact multiplies the speed by e^2"),
+        (lambda s: {"restitution": 0.9 * s.restitution}, "an impact multiplies the speed by 0.9 e"),
+        (lambda _: {"restitution": 1.0}, "every impact is elastic"),
+        (lambda s: {"bottle": replace(s.bottle, mass=0.8 * s.bottle.mass)}, "the bottle weighs 0.8 of M_b"),
+        (
+            lambda s: {"bottle": replace(s.bottle, radius=2**0.5 * s.bottle.radius)},
+            "J has M_b R^2 instead of M_b R^2/2",
+        ),
+    ],
+)
+def test_the_reference_thrown_otherwise_is_named(change, words):
+    assert named(Thrown(change)) == words
+
+
+def test_eq8_itself_and_what_no_mistake_explains_have_no_name():
+    assert named(Thrown(lambda _: {})) == ""
+    assert named(Thrown(lambda s: {"drag": 0.5 * s.drag, "gravity": 0.7 * s.gravity})) == ""
+    unknown = Thrown(lambda s: {"drag": 0.5 * s.drag})
+    unknown.equation = "free-flight"
+    assert named(unknown) == ""
+
+
+@pytest.mark.parametrize("words", SLOW)
+def test_a_speed_below_which_something_stops_is_told_to_a_digit(words):
+    field = SLOW[words]
+    said = named(Likened({field: 0.1}))
+    (one,) = [one for one in said.split(" or ") if one.startswith(words.partition("{")[0])]
+    assert 0.05 <= float(one.partition("about ")[2].split()[0]) <= 0.2
+
+
+@pytest.mark.parametrize(
+    "words", [pytest.param(words, marks=pytest.mark.slow) if k % 4 else words for k, words in enumerate(FITTED)]
+)
+def test_a_factor_is_found_again(words):
+    assert words.format(0.83) in named(Likened(dict.fromkeys(FITTED[words], 0.83)))
+
+
+@pytest.mark.parametrize(
+    ("group", "mistake", "words"),
+    [
+        ("twentysecond", "magnus_cap_swallows", "a slice stays on the cap that it strikes"),
+        ("twentysecond", "magnus_drag_over_all_water", "alpha is divided by the mass of all the water"),
+        ("twentysecond", "newmark_drag_against_tube", "drag is taken against the tube instead of C_M"),
+        ("twentysecond", "newmark_no_parallel_axis", "M_b (L/2 - r_CM)^2 is left out of J"),
+    ],
+)
+def test_what_others_planted_is_named(group, mistake, words):
+    assert words in named(patches(group)[mistake].solver())
+
+
+def test_the_line_of_a_check_of_motion_names_the_mistake():
+    solver = InProcess(Thrown(lambda s: {"restitution": s.restitution**2}), "x")
+    (result,) = certify(solver, ["equation"]).results
+    assert result.text.endswith("it answers like a solver in which an impact multiplies the speed by e^2")
