@@ -1,9 +1,12 @@
 """The flock: slices that meet no end for some steps, moved by one map and weighed by their moments.
 
 Linear maps that all slices share make one such map, and the sums of y and y^2 after it follow from those of y, v, y^2,
-y v and v^2 before (docs/theory.md, "Slices that meet no end"). The slices of the flock are not looked at until they are
-to be recorded or one of them may have come near an end. All others are watched: copies of their y and v are moved in
-every step (``rebound.Watched``). ``y`` and ``v`` of all slices are those of the last gathering.
+y v and v^2 before: with u = alpha y_0 + beta v_0 + delta, by which a slice has moved, sum y^2 = sum y_0^2 + 2 sum u
+y_0 + sum u^2. If y_0 and y_0 + T v_0 lie between low and high for all, y lies between a low + delta and a high +
+delta, a = 1 + alpha, as long as 0 <= beta <= a T, because y = (a - beta/T) y_0 + (beta/T) (y_0 + T v_0) + delta. The
+slices of the flock are not looked at until they are to be recorded or one of them may have come near an end. All
+others are watched: copies of their y and v are moved in every step (``rebound.Watched``). ``y`` and ``v`` of all
+slices are those of the last gathering.
 """
 
 from __future__ import annotations

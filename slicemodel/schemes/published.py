@@ -60,7 +60,8 @@ PUBLISHED_MATLAB = Scheme(
     ),
     limit="slices leave the bottle",
     reason="The MATLAB program of the supplement. As published-python, but a rebound flips the velocity and leaves the "
-    "slice outside; g = 9.8, epsilon of Eq. 4b, e = 0.5 whatever the scenario says.",
+    "slice outside; the position update divides gamma by N twice; g = 9.8, epsilon of Eq. 4b, e = 0.5 whatever the "
+    "scenario says.",
     constants=matlab_constants,
 )
 

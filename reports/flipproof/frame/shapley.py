@@ -1,7 +1,8 @@
 """Fair shares: what each of several changes does, as the mean over all orders in which they can be made.
 
-The mean over all orders (the Shapley value) is the only split that treats changes alike and sums to the whole. What it
-gives depends on what counts as one change: two that are made together are one, and have one share.
+The mean over all orders (the Shapley value) treats changes alike, gives nothing to one that changes nothing, and sums
+to the whole. What it gives depends on what counts as one change: two that are made together are one, and have one
+share.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
     program --step size--> its limit --signs--> --roots--> --drag reference--> --gravity--> --origin--> --recoil--> free
 
 Mending the assumptions in this order gives one split (forward), in the reverse order another (backward); where the two
-differ, assumptions interact. The average over all orders (the Shapley value) is the only split that treats
-them alike: an assumption's fair share. Each of the three sums to the whole difference, which is asserted. A bar of one
-order, or the largest bar of any order, is no share: another order gives another number. The step size comes first in
-every order: only the program has one.
+differ, assumptions interact. The average over all orders (the Shapley value) treats them alike, and gives nothing to
+one that changes nothing: an assumption's fair share. Each of the three sums to the whole difference, which is
+asserted. A bar of one order, or the largest bar of any order, is no share: another order gives another number. The
+step size comes first in every order: only the program has one.
 
 In the margin stands what forbidding overlap changes: free flight still lets slices overlap, rods of water cannot
 (``ode_reference.rods``). Rods have no switches, so that they take no part in the orders: rods minus free flight is a
