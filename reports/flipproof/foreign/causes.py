@@ -29,6 +29,8 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
         return "its slices do not move: look at what is taken for ice"
     if held := _held(intervals):
         return held
+    if np.mean([_whole_turns(i) for i in intervals]) > 0.5:
+        return "theta is off by whole turns: do not wrap it"
     # Answers may be arbitrary; no cause can be found for numbers that overflow.
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
         if cause := _angle_cause(intervals) or time_cause(intervals):
@@ -44,6 +46,12 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
             or _slice_cause(intervals)
         )
     return ""
+
+
+def _whole_turns(interval: Interval) -> bool:
+    """Return whether theta alone is off, by a whole number of turns."""
+    turns = float(interval.theta[1] - interval.expected["theta"]) / (2 * np.pi)
+    return bool(round(turns) and abs(turns - round(turns)) < 1e-4)
 
 
 def _held(intervals: Sequence[Interval]) -> str:
@@ -221,7 +229,7 @@ def _place_cause(intervals: Sequence[Interval]) -> str:
     # A late impact would end somewhere else each time.
     if half or np.mean(shares[outside] > 0.999 * largest) > 0.3:
         share = "half their height" if half else f"{largest:.2g} of their height"
-        return f"slices go on to {share} beyond an end: look at the places of the ends, h/2 and L - h/2"
+        return f"slices go on to {share} beyond an end: look at the places of the ends, h/2N and L - h/2N"
     return (
         f"slices are answered up to {beyond.max():.2g} m beyond an end: an answer between two steps must know of an "
         "impact on its way: look at times after an impact in the same step"

@@ -273,7 +273,7 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     if observation.holds:
         return result(verdict=WEAK if observation.weak else PASSED, observation=observation)
     if name in OF_MOTION and (named := _named(traits, recorder)):
-        observation = replace(observation, advice=f"it answers like a solver in which {named}")
+        observation = replace(observation, advice=named)
     return result(
         verdict=FAILED if reason is None else EXPECTED,
         observation=observation,
@@ -282,7 +282,7 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
 
 
 def _named(traits: Traits, recorder: _Recorder) -> str:
-    """Return the known mistake with which a solver answers, empty if there is none; looked for once per solver."""
+    """Return like a solver with which known mistake one answers, empty if there is none; looked for once per solver."""
     if recorder.named is None:
         recorder.named = ""
         with suppress(WaitingError):  # nobody is asked to write more answers for an advice

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flipproof.foreign import elsewhere
 from flipproof.foreign.causes import parts_of_inertia, rms
@@ -80,6 +81,11 @@ def check_start(traits: Traits) -> CheckGenerator:
     cached = ask is asks[-1] and (worst == "omega" or np.array_equal(answer.omega, answers[0].omega))
     from_slope = worst == "omega" and not cached and bound < errors[worst] < 0.05
     hint = _places_advice(ask, answer) if worst == "r" and answer.r is not None else ""
+    if from_slope:
+        (closer,) = yield [replace(ask, times=ask.times / 10)]
+        if abs(abs(closer.omega[0] / throw.omega0 - 1.0) / errors["omega"] - 1.0) < 0.1:  # no slope: it would be nearer
+            from_slope = False
+            hint = "omega(0) is off by as much at any times asked: J_0 in J_0 omega_0 is not the J of the start"
     turns = (answer.theta[0] - throw.theta0) / (2 * np.pi)
     if worst == "theta" and round(turns) and abs(turns - round(turns)) < 1e-6:
         hint = "theta is off by whole turns: do not wrap it"
@@ -88,7 +94,7 @@ def check_start(traits: Traits) -> CheckGenerator:
     if worst == "omega" and not (errors[worst] <= bound or cached or from_slope):
         (inside,) = yield [replace(ask, start=elsewhere.far_from_ends(throw))]
         if abs(inside.omega[0] / throw.omega0 - 1.0) <= bound:
-            hint = "right from a start far from the ends: look at the places of the ends, h/2 and L - h/2"
+            hint = "right from a start far from the ends: look at the places of the ends, h/2N and L - h/2N"
     return Observation(
         holds=errors[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
@@ -195,6 +201,7 @@ def check_inputs(traits: Traits) -> CheckGenerator:
             for name in names
         )
     ]
+    still = bool(ignored) and np.ptp(answers[0].omega) < 1e-12 * THROW.omega0
     return Observation(
         holds=not ignored,
         expected="other numbers for another question",
@@ -202,7 +209,9 @@ def check_inputs(traits: Traits) -> CheckGenerator:
         if ignored
         else "other numbers each time",
         where=f"{len(variants)} parts of the question, each changed alone after the throw of most checks",
-        advice=(
+        advice="omega never changes, as if no slice moved: look at what holds slices, and at what is taken for ice"
+        if still
+        else (
             "slices keep the order of ask.start: sort them neither when they are read nor when they are answered; "
             if "another order of the start" in ignored
             else ""
@@ -269,6 +278,9 @@ def _outputs_advice(traits: Traits, sparse: Answer, dense_omega: FloatArray) -> 
     except ValueError:
         return ""
     exact = curve(equation, SMOOTH, sparse.t).omega
+    (early,) = yield [replace(ask_of(traits, SMOOTH), times=np.concatenate([[0.0], sparse.t]))]
+    if 10 * np.max(np.abs(early.omega[1:] - exact)) < np.max(np.abs(sparse.omega - exact)):
+        return "right if t = 0 is asked, too: look at what is taken at the first time asked instead of at release; "
     sparse_error, dense_error = (float(np.max(np.abs(omega - exact))) for omega in (sparse.omega, dense_omega))
     close = "right where outputs lie close" if sparse_error >= 4 * dense_error else ""
     answers = yield [replace(ask_of(traits, throw), times=sparse.t) for throw in CALM.values()]
@@ -488,7 +500,7 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     values = np.asarray(getattr(answer, worst))
     hint = _decimals_advice(answer) + _delay_advice(values, derived[worst])
     if worst == "inertia":
-        hint += _parts_advice(answer.r, values)
+        hint += _parts_advice(answer.r, values) or _beyond_advice(answer, errors["inertia"] > bound)
     elif np.max(np.abs(values + derived["r_cm"] - scale["r_cm"])) < bound * scale["r_cm"]:
         hint += "r_cm is L minus the right one: measure it from the cap; "
     elif not hint and answer.t[0] == 0.0 and errors["r_cm"][0] <= bound and np.ptp(values) > bound * scale["r_cm"]:
@@ -499,6 +511,18 @@ def check_definitions(traits: Traits) -> CheckGenerator:
         observed=f"{worst} off by {errors[worst].max():.2g}",
         where=time_of_max(answer.t, errors[worst]),
         advice=hint.removesuffix("; ") or DEFINED[worst],
+    )
+
+
+def _beyond_advice(answer: Answer, wrong: NDArray[np.bool_]) -> str:
+    """Return that an inertia is wrong only where a slice is answered on an end, if it is and is right elsewhere."""
+    assert answer.r is not None
+    on_end = np.any((answer.r <= THROW.r_min) | (answer.r >= THROW.r_max), axis=1)
+    if not wrong.any() or np.mean(wrong) > 0.5 or np.any(wrong & ~on_end):
+        return ""
+    return (
+        "only while a slice is answered on an end: J may be that of a slice beyond it, whose r is clipped: look at "
+        "impacts that a step misses; "
     )
 
 
@@ -532,12 +556,18 @@ def _behind_advice(answer: Answer) -> str:
     return ""
 
 
+WEIGHTS: Final = "look at the length of a step, and at weights of the method, which have to add up to 1"
+
+
 def _factor_advice(answer: Answer) -> str:
     """Return that v is a constant times dr/dt, if it is, with what the constant may be."""
     slope, mean = _slopes(answer)
     factor = float(np.sum(slope * mean) / max(float(np.sum(slope**2)), 1e-300))
     if abs(factor - 1.0) < 0.01 or not rms(mean - factor * slope) < 0.02 * rms(mean):
         return ""
+    turned = np.diff(answer.theta) / np.diff(answer.t) / (answer.omega[1:] + answer.omega[:-1]) * 2
+    if abs(factor * float(np.median(turned)) - 1.0) < 0.002:
+        return f"r and theta both go {1 / factor:.4g} times as far as v and omega say: {WEIGHTS}; "
     spin, length = abs(SMOOTH.omega0), SMOOTH.bottle.length
     constants = {"1 / omega_0": 1 / spin, "omega_0": spin, "1 / L": 1 / length, "L": length}
     name = next((f", {name}," for name, value in constants.items() if abs(factor / value - 1.0) < 0.005), "")
@@ -613,10 +643,12 @@ def check_velocity(traits: Traits) -> CheckGenerator:
         expected=f"v = dr/dt within {bound:.1g} of the largest v, or a difference that falls with refinement",
         observed=f"off by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
         where="0.05 s",
-        advice=_times_advice(answers[0])
+        advice=factor_advice
+        if WEIGHTS in (factor_advice := _factor_advice(answers[0]))
+        else _times_advice(answers[0])
         + ("v is the same at all times: answer a copy of each state; " if constant else "")
         + _behind_advice(answers[0])
-        + _factor_advice(answers[0])
+        + factor_advice
         + (
             "the difference falls with the step: look at how r and v are answered between two steps; "
             if sizes[-1] < 0.7 * sizes[0]

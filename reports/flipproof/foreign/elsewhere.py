@@ -25,7 +25,6 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 import ode_reference
 from flipproof.foreign.checking import THROW, CheckGenerator, NotApplicableError, Observation, effort_of
@@ -687,10 +686,15 @@ def bisected(
     for name, throw, trial in trials:
         result = (yield from confirmed(traits, throw, trial, seed, equation, unrefined)) if trial.wrong else trial
         if result.wrong:
+            fields = _field_advice(result, ice=knobs.frozen)
+            smooth = not (knobs.frozen or fields or result.impacts_passed)
+            without = (yield from _without_a_force(compare_all, throw, name)) if smooth else ""
+            # A slice that never moves is wrong before any impact.
+            knob_advice = "" if name == "slices" and result.impacts_passed else WORDS[name][1]
             return (
                 f"{ice}right at {knob_text(PAPER, name)}, wrong at {knob_text(knobs, name)}: {_wrong_text(result)}",
                 together or _impact_advice(result),
-                _field_advice(result, ice=knobs.frozen) or WORDS[name][1],
+                fields or without or knob_advice,
             )
     reverted = yield from compare_all([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
     decisive = [name for name, result in zip(names, reverted, strict=True) if not result.wrong and result.share > 0.3]
@@ -709,6 +713,18 @@ def bisected(
         together or _impact_advice(comparison),
         _field_advice(comparison, ice=knobs.frozen),
     )
+
+
+def _without_a_force(
+    compare_all: Callable[[Sequence[Knobs]], ComparisonsGenerator], throw: Knobs, name: str
+) -> TextGenerator:
+    """Return that a throw, wrong because of one knob, is right without weight or without drag, if it is."""
+    trials = {"drag": replace(throw, damping=0.0), "weight": replace(throw, gravity=0.0)}
+    trials = {force: trial for force, trial in trials.items() if trial != throw and name not in ("damping", "gravity")}
+    results = yield from compare_all(list(trials.values()))
+    right = [force for force, result in zip(trials, results, strict=True) if not result.wrong and result.share > 0.3]
+    # Without weight nothing may move that drag could spoil.
+    return f"there right without {' and without '.join(right)}: look at {LOOK_AT[right[0]]}" if right else ""
 
 
 def wrong_on_whole(traits: Traits, equation: str) -> TextGenerator:
@@ -796,35 +812,7 @@ def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNRE
     (centred,) = yield from comparing(traits, [replace(simpler["all"], start="in the middle")], 0, equation, unrefined)
     if not centred.wrong:
         return f"{text}, but right with every slice far from the ends: look at the places of the ends, and at rests; "
-    factor = yield from _as_if(traits, simpler["all"], equation)
-    if factor:
-        return f"{text}: as if {factor}; "
     return f"{text}: look at the centrifugal term omega^2 (r - r_cm), the inertia and the masses; "
-
-
-def _as_if(traits: Traits, knobs: Knobs, equation: str) -> TextGenerator:
-    """Return with what other mass or own inertia of the bottle an answer before the first impact goes; or empty."""
-    ask = knobs.ask(0)
-    (answer,) = yield [replace(ask, effort=effort_of(traits, ask.scenario, LEVELS[1][0]))]
-
-    def distance(log_factor: float, name: str) -> float:
-        altered = replace(knobs, **{name: getattr(knobs, name) * math.exp(log_factor)}).ask(0).scenario
-        flight = ode_reference.solve(started(replace(ask, scenario=altered)), switches_of(equation), ask.times)
-        return float(np.max(np.abs(flight.omega - answer.omega))) / abs(knobs.omega0)
-
-    length, radius, causes = knobs.length**2 / 12, knobs.radius**2 / 2, []
-    for name in ("mass", "radius"):  # which may lead to the same omega
-        nearest = min(np.linspace(-2.0, 2.0, 33), key=lambda log_factor: distance(log_factor, name))
-        fit = minimize_scalar(distance, bounds=(nearest - 0.125, nearest + 0.125), args=(name,))
-        if fit.fun <= max(FLOOR / 10, 0.02 * distance(0.0, name)):
-            factor = math.exp(fit.x)
-            inertia = (radius * factor**2 + length) / (radius + length)
-            causes.append(
-                f"M_b were {factor:.3g} of it"
-                if name == "mass"
-                else f"the bottle's own inertia, M_b (R^2/2 + L^2/12), were {inertia:.3g} of it"
-            )
-    return " or ".join(causes)
 
 
 def _wrong_text(comparison: Comparison) -> str:

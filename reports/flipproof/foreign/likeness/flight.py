@@ -48,6 +48,7 @@ class Mistake(NamedTuple):
     e_power: float = 1.0
     least_speed: float = 0.0  # of an impact that rebounds [L omega_0]
     rest_speed: float = 1e-6  # [L omega_0]
+    rest_height: float = 0.0  # of the next bounce [L]
     rests_if_pressed: float = 0.0  # a slice rests at its first impact if its end presses it
     push_centrifugal: float = 1.0
     push_weight: float = 1.0
@@ -187,7 +188,8 @@ def _react(y, held, n, momentum, tube, q):
         speed = 0.0 if abs(v) < q.least_speed * scale else e * abs(v)
         y[1 + i] = tube.high if side > 0 else tube.low
         y[1 + n + i] = -side * speed
-        if speed < q.rest_speed * scale or q.rests_if_pressed:
+        low = speed * speed < 2.0 * q.rest_height * tube.length * _push(y, side, held, n, momentum, tube, q)
+        if speed < q.rest_speed * scale or low or q.rests_if_pressed:
             held[i] = side
             y[1 + n + i] = 0.0
             if _lets_go(y, i, held, n, momentum, tube, q):

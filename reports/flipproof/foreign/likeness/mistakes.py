@@ -46,6 +46,9 @@ UNREFINED: Final = 1e-4
 FAR: Final = 10.0
 """Rooms by which Eq. 8 must be off at least where a mistake is named."""
 
+NEARER: Final = 20.0
+"""How much nearer than Eq. 8 a mistake must be on throws that it does not explain, to be named as near."""
+
 Factors = Mapping[str, float]
 
 MISTAKES: Final[Mapping[str, Factors | Callable[[Scenario], Factors]]] = {
@@ -108,14 +111,15 @@ MISTAKES: Final[Mapping[str, Factors | Callable[[Scenario], Factors]]] = {
 }
 """What is wrong -> factors and switches, which may depend on the throw; the words end "like a solver in which"."""
 
-SLOW: Final[Mapping[str, str]] = {
-    "a slice rests as soon as it leaves an end slower than about {:.1g} L omega_0": "rest_speed",
-    "an impact slower than about {:.1g} L omega_0 does not rebound": "least_speed",
+SLOW: Final[Mapping[str, tuple[str, str, str]]] = {
+    "a slice rests as soon as it leaves an end slower than about {}": ("rest_speed", "L omega_0", "m/s"),
+    "a slice rests as soon as its next bounce would be lower than about {}": ("rest_height", "L", "m"),
+    "an impact slower than about {} does not rebound": ("least_speed", "L omega_0", "m/s"),
 }
-"""What is wrong at low speeds -> the switch that holds the speed; the same in m/s is another mistake."""
+"""What is wrong below a speed or a height -> the switch that holds it, its unit, and that of one that is no share."""
 
-SPEEDS: Final = np.geomspace(3e-3, 0.5, 16)
-"""Speeds tried [L omega_0], or in m/s."""
+LIMITS: Final = np.geomspace(1e-3, 0.5, 120)
+"""Speeds and heights tried, in either unit."""
 
 FITTED: Final[Mapping[str, tuple[str, ...]]] = {
     "the drag counts {:.3g} times": ("drag",),
@@ -166,7 +170,7 @@ class _Flown:
 
 
 def naming(traits: Traits) -> TextGenerator:
-    """Return the mistake with which a solver of Eq. 8 answers, or two that agree; empty if no known one does."""
+    """Return like a solver with which mistake in Eq. 8 one answers, or with which two; empty if no known one does."""
     try:
         if traits.equation is None or name_of(switches_of(traits.equation)) != "eq8":
             return ""
@@ -182,9 +186,11 @@ def naming(traits: Traits) -> TextGenerator:
     if len(flown) < 2 or not max(one.excess({}) for one in flown) > FAR:
         return ""
     named = [words for words, factors in MISTAKES.items() if _explains(flown, factors)]
-    named = named or [text for words, field in SLOW.items() if (text := _slow(flown, words, field))]
+    named = named or [text for words, how in SLOW.items() if (text := _slow(flown, words, *how))]
     named = named or [text for words, fields in FITTED.items() if (text := _fitted(flown, words, fields))]
-    return " or ".join(named[:2])
+    nearly = [] if named else [words for words, factors in MISTAKES.items() if _nearly_explains(flown, factors)]
+    answers_like = f"it answers {'nearly ' if nearly else ''}like a solver in which"
+    return f"{answers_like} {' or '.join((named or nearly)[:2])}" if named or nearly else ""
 
 
 def _flown(traits: Traits, ask: Ask, answers: Sequence[Answer]) -> _Flown:
@@ -200,17 +206,27 @@ def _explains(flown: Sequence[_Flown], factors: Factors | Callable[[Scenario], F
     return all(one.excess(factors) <= 1.0 for one in flown)
 
 
-def _slow(flown: Sequence[_Flown], words: str, field: str) -> str:
-    """Return below which speed a mistake leads to the answers on all throws; empty with none."""
+def _nearly_explains(flown: Sequence[_Flown], factors: Factors | Callable[[Scenario], Factors]) -> bool:
+    """Return whether a mistake leads to the answers on a throw, and on the others is ``NEARER`` to them than Eq. 8."""
+    distances = [(one.excess(factors), one.excess({})) for one in flown]
+    exact = sum(distance <= 1.0 and eq8 > FAR for distance, eq8 in distances)
+    return exact >= 1 and all(distance <= max(1.0, eq8 / NEARER) for distance, eq8 in distances)
 
-    def in_metres(speed: float) -> Callable[[Scenario], Factors]:
-        return lambda s: {field: speed / (s.bottle.length * abs(s.omega0))}
 
-    for speed in SPEEDS.tolist():
-        if _explains(flown, {field: speed}):
-            return words.format(speed)
-        if _explains(flown, in_metres(speed)):
-            return words.replace("L omega_0", "m/s").format(speed)
+def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> str:
+    """Return below which limit a mistake leads to the answers on all throws; empty with none."""
+
+    def relative(limit: float) -> Factors:
+        return {field: limit}
+
+    def absolute(limit: float) -> Callable[[Scenario], Factors]:
+        return lambda s: {field: limit / s.bottle.length / (abs(s.omega0) if field.endswith("speed") else 1.0)}
+
+    ways: tuple[Callable[[float], Factors | Callable[[Scenario], Factors]], ...] = (relative, absolute)
+    for unit, factors in zip(units, ways, strict=True):
+        # Limits between the same two speeds lead to the same flights.
+        if limits := [limit for limit in LIMITS.tolist() if _explains(flown, factors(limit))]:
+            return words.format(f"{limits[len(limits) // 2]:.1g} {unit}")
     return ""
 
 
