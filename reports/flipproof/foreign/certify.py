@@ -282,7 +282,7 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
 
 
 def _named(traits: Traits, recorder: _Recorder) -> str:
-    """Return like a solver with which known mistake one answers, empty if there is none; looked for once per solver."""
+    """Return which known mistake gives a solver's answers, a sentence; empty if none does. It is sought once."""
     if recorder.named is None:
         recorder.named = ""
         with suppress(WaitingError):  # nobody is asked to write more answers for an advice

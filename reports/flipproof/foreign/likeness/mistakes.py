@@ -50,8 +50,10 @@ NEARER: Final = 20.0
 """How much nearer than Eq. 8 a mistake must be on throws that it does not explain, to be named as near."""
 
 Factors = Mapping[str, float]
+Change = Factors | Callable[[Scenario], Factors]
+"""Factors and switches of a flight; a function gives them for a throw."""
 
-MISTAKES: Final[Mapping[str, Factors | Callable[[Scenario], Factors]]] = {
+MISTAKES: Final[Mapping[str, Change]] = {
     "drag is missing": {"drag": 0.0},
     "drag drives slices instead of slowing them": {"drag": -1.0},
     "drag is taken against the tube instead of C_M": {"reference": 0.0},
@@ -109,7 +111,7 @@ MISTAKES: Final[Mapping[str, Factors | Callable[[Scenario], Factors]]] = {
     "slice 0 never moves": {"still": 0.0},
     "the last slice never moves": lambda s: {"still": s.n_slices - 1.0},
 }
-"""What is wrong -> factors and switches, which may depend on the throw; the words end "like a solver in which"."""
+"""What is wrong -> what it changes; the words follow "it answers like a solver in which"."""
 
 SLOW: Final[Mapping[str, tuple[str, str, str]]] = {
     "a slice rests as soon as it leaves an end slower than about {}": ("rest_speed", "L omega_0", "m/s"),
@@ -158,19 +160,19 @@ class _Flown:
     omega: FloatArray
     room: FloatArray
 
-    def off(self, factors: Factors | Callable[[Scenario], Factors]) -> FloatArray:
+    def off(self, change: Change) -> FloatArray:
         """Return by how many rooms the flight with a mistake is off at each time."""
-        chosen = factors(self.ask.scenario) if callable(factors) else factors
-        omega = fly(self.ask, Mistake(**chosen)) / abs(self.ask.scenario.omega0)
+        factors = change(self.ask.scenario) if callable(change) else change
+        omega = fly(self.ask, Mistake(**factors)) / abs(self.ask.scenario.omega0)
         return np.nan_to_num(np.abs(omega[: len(self.omega)] - self.omega) / self.room, nan=1e9)
 
-    def excess(self, factors: Factors | Callable[[Scenario], Factors]) -> float:
+    def excess(self, change: Change) -> float:
         """Return the largest number of rooms by which the flight with a mistake is off."""
-        return float(np.max(self.off(factors), initial=0.0))
+        return float(np.max(self.off(change), initial=0.0))
 
 
 def naming(traits: Traits) -> TextGenerator:
-    """Return like a solver with which mistake in Eq. 8 one answers, or with which two; empty if no known one does."""
+    """Return "it answers like a solver in which" and the mistake that gives its answers, or two; empty if none does."""
     try:
         if traits.equation is None or name_of(switches_of(traits.equation)) != "eq8":
             return ""
@@ -185,10 +187,10 @@ def naming(traits: Traits) -> TextGenerator:
             flown.append(_flown(traits, ask, answers))
     if len(flown) < 2 or not max(one.excess({}) for one in flown) > FAR:
         return ""
-    named = [words for words, factors in MISTAKES.items() if _explains(flown, factors)]
+    named = [words for words, change in MISTAKES.items() if _explains(flown, change)]
     named = named or [text for words, how in SLOW.items() if (text := _slow(flown, words, *how))]
     named = named or [text for words, fields in FITTED.items() if (text := _fitted(flown, words, fields))]
-    nearly = [] if named else [words for words, factors in MISTAKES.items() if _nearly_explains(flown, factors)]
+    nearly = [] if named else [words for words, change in MISTAKES.items() if _nearly_explains(flown, change)]
     answers_like = f"it answers {'nearly ' if nearly else ''}like a solver in which"
     return f"{answers_like} {' or '.join((named or nearly)[:2])}" if named or nearly else ""
 
@@ -201,14 +203,14 @@ def _flown(traits: Traits, ask: Ask, answers: Sequence[Answer]) -> _Flown:
     return _Flown(ask, fine[:clear] / spin, room[:clear])
 
 
-def _explains(flown: Sequence[_Flown], factors: Factors | Callable[[Scenario], Factors]) -> bool:
+def _explains(flown: Sequence[_Flown], change: Change) -> bool:
     """Return whether a mistake leads to the answers on all throws."""
-    return all(one.excess(factors) <= 1.0 for one in flown)
+    return all(one.excess(change) <= 1.0 for one in flown)
 
 
-def _nearly_explains(flown: Sequence[_Flown], factors: Factors | Callable[[Scenario], Factors]) -> bool:
+def _nearly_explains(flown: Sequence[_Flown], change: Change) -> bool:
     """Return whether a mistake leads to the answers on a throw, and on the others is ``NEARER`` to them than Eq. 8."""
-    distances = [(one.excess(factors), one.excess({})) for one in flown]
+    distances = [(one.excess(change), one.excess({})) for one in flown]
     exact = sum(distance <= 1.0 and eq8 > FAR for distance, eq8 in distances)
     return exact >= 1 and all(distance <= max(1.0, eq8 / NEARER) for distance, eq8 in distances)
 
@@ -216,16 +218,16 @@ def _nearly_explains(flown: Sequence[_Flown], factors: Factors | Callable[[Scena
 def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> str:
     """Return below which limit a mistake leads to the answers on all throws; empty with none."""
 
-    def relative(limit: float) -> Factors:
+    def relative(limit: float) -> Change:
         return {field: limit}
 
-    def absolute(limit: float) -> Callable[[Scenario], Factors]:
+    def absolute(limit: float) -> Change:
         return lambda s: {field: limit / s.bottle.length / (abs(s.omega0) if field.endswith("speed") else 1.0)}
 
-    ways: tuple[Callable[[float], Factors | Callable[[Scenario], Factors]], ...] = (relative, absolute)
-    for unit, factors in zip(units, ways, strict=True):
+    ways: tuple[Callable[[float], Change], ...] = (relative, absolute)
+    for unit, change_at in zip(units, ways, strict=True):
         # Limits between the same two speeds lead to the same flights.
-        if limits := [limit for limit in LIMITS.tolist() if _explains(flown, factors(limit))]:
+        if limits := [limit for limit in LIMITS.tolist() if _explains(flown, change_at(limit))]:
             return words.format(f"{limits[len(limits) // 2]:.1g} {unit}")
     return ""
 
