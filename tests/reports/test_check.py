@@ -183,3 +183,8 @@ def test_a_value_that_is_not_a_number_fails():
     finding = Finding(id="x", title="x", value=float("nan"), unit="m", kind="regression", admissible=(0.0, 1.0))
     assert line(finding, "threshold ≤ 1") == "FAIL  x: nan m; threshold ≤ 1"
     assert line(replace(finding, value=0.5), "threshold ≤ 1") == "PASS  x: 0.5 m; threshold ≤ 1"
+
+
+def test_a_tolerance_without_a_baseline_is_refused(place):
+    with pytest.raises(ValueError, match=r"--tolerance 0\.1: needs --baseline"):
+        flipproof("check", place() / "throw.toml", "--tolerance", "0.1", "--only", "ice")

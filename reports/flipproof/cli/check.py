@@ -85,6 +85,8 @@ def command_check(options: argparse.Namespace) -> int:
     groups = options.only or tuple(group for group in known_groups() if options.baseline or group != "thresholds")
     if "thresholds" in groups and options.baseline is None:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
+    if options.tolerance is not None and options.baseline is None:
+        raise ValueError(f"--tolerance {options.tolerance:g}: needs --baseline, whose findings it is allowed to move")
     check_outputs(options, "junit", "json")
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check

@@ -73,6 +73,12 @@ def effort_of(traits: Traits, scenario: Scenario, level: float) -> float | None:
     return None
 
 
+def refined_words(traits: Traits) -> str:
+    """Return what two levels of refinement are, in words."""
+    words = {"dt": "a quarter of the step", "steps": "four times the steps", "rtol": "a hundredth of rtol"}
+    return words[traits.refined_by or "dt"]
+
+
 def shift(first: Answer, second: Answer, scale: float) -> float:
     """Return the largest difference of two curves omega(t), as a fraction of ``scale``."""
     return float(np.max(np.abs(first.omega - second.omega)) / abs(scale))

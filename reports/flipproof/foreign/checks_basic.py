@@ -21,6 +21,7 @@ from flipproof.foreign.checking import (
     Observation,
     ask_of,
     decimals_of,
+    refined_words,
     shift,
     time_of_max,
 )
@@ -398,10 +399,10 @@ def check_angle(traits: Traits) -> CheckGenerator:
         )
     return Observation(
         holds=holds and not stops,
-        expected=f"theta - theta_0 = integral of omega within {bound:.1g} rad, or a change that falls with dt",
+        expected=f"theta - theta_0 = integral of omega within {bound:.1g} rad, or a change that falls under refinement",
         observed=f"off by {slow_error:.2g} rad"
         if stops
-        else f"off by {sizes[0]:.2g} rad{_at_a_quarter(sizes, ' rad')}",
+        else f"off by {sizes[0]:.2g} rad{_refined_text(traits, sizes, ' rad')}",
         where=f"flight of {SLOW.duration:g} s" if stops else time_of_max(asks[0].times, errors[0]),
         advice=stall_advice or "fly to the last of ask.times, however late that is"
         if stops
@@ -641,7 +642,7 @@ def check_velocity(traits: Traits) -> CheckGenerator:
     return Observation(
         holds=sizes[0] <= bound or (_falls(sizes) and sizes[-1] < 1e-2),
         expected=f"v = dr/dt within {bound:.1g} of the largest v, or a difference that falls with refinement",
-        observed=f"off by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
+        observed=f"off by {sizes[0]:.2g}{_refined_text(traits, sizes)}",
         where="0.05 s",
         advice=factor_advice
         if WEIGHTS in (factor_advice := _factor_advice(answers[0]))
@@ -687,7 +688,7 @@ def check_momentum(traits: Traits) -> CheckGenerator:
         holds=holds,
         weak=f"J omega is kept to {sizes[0]:.1g} only, whatever the step" if sizes[0] > bound and not falls else "",
         expected=f"J omega constant within {bound:.1g}, or a change that falls with refinement",
-        observed=f"changed by {sizes[0]:.2g}{_at_a_quarter(sizes)}",
+        observed=f"changed by {sizes[0]:.2g}{_refined_text(traits, sizes)}",
         where=time_of_max(asks[0].times, changes[0]),
         advice=f"{advice}no torque acts about the centre of mass: omega = J_0 omega_0 / J, with J of the same instant, "
         "about the centre of mass, of slices and bottle",
@@ -723,8 +724,8 @@ def _falls(sizes: Sequence[float], min_ratio: float = 3.0) -> bool:
     return len(sizes) > 1 and sizes[-1] * min_ratio <= sizes[0]
 
 
-def _at_a_quarter(sizes: Sequence[float], unit: str = "") -> str:
-    return f", {sizes[-1]:.2g}{unit} at a quarter of the step" if len(sizes) > 1 else ""
+def _refined_text(traits: Traits, sizes: Sequence[float], unit: str = "") -> str:
+    return f", {sizes[-1]:.2g}{unit} at {refined_words(traits)}" if len(sizes) > 1 else ""
 
 
 def check_mirror(traits: Traits) -> CheckGenerator:

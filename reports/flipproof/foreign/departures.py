@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.foreign.causes import cause_of, delay, rms, time_cause
-from flipproof.foreign.checking import NotApplicableError, effort_of
+from flipproof.foreign.checking import NotApplicableError, effort_of, refined_words
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.interval import FLOOR, Interval, intervals_of
 from flipproof.foreign.place import switches_of
@@ -166,7 +166,7 @@ def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureG
                 raise
             continue
         if coarse:
-            if passed_over := _passed_over(coarse, intervals):
+            if passed_over := _passed_over(traits, coarse, intervals):
                 advice = "the slice goes on as before it: an answer between two steps must know of an impact on its way"
                 return passed_over, advice
             spoiled = max(spoiled, _spoiled(traits, coarse, intervals))
@@ -256,7 +256,7 @@ def _spoiled(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval
         )
     return (
         f"at impacts that come alone, by {coarse_size:.1g} of a field's scale (median of {len(lone[0])}) and by "
-        f"{fine_size:.1g} at a quarter of the step",
+        f"{fine_size:.1g} at {refined_words(traits)}",
         f"steps without an impact have a higher order: {advice}",
     )
 
@@ -283,7 +283,7 @@ def _overlooked(intervals: Sequence[Interval]) -> str:
     return f"in {count} of {len(sizes)} intervals with an impact"
 
 
-def _passed_over(coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:
+def _passed_over(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:
     """Return how often a slice still moves towards the end that it struck well before, if rarely with short steps."""
     counts = []
     for intervals in (coarse, fine):
@@ -297,7 +297,7 @@ def _passed_over(coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:
         counts.append(sum(i.v[1][i.hits[0][0]] * i.expected["v"][i.hits[0][0]] < 0.0 for i in lone))
     if counts[0] < FEW or counts[1] > counts[0] / 2:
         return ""
-    return f"after {counts[0]} impacts with none shortly before, and after {counts[1]} at a quarter of the step"
+    return f"after {counts[0]} impacts with none shortly before, and after {counts[1]} at {refined_words(traits)}"
 
 
 def _lone(intervals: Sequence[Interval]) -> list[Interval]:
