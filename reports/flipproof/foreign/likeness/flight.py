@@ -39,7 +39,7 @@ class Mistake(NamedTuple):
     moments_about: float = 0.0
     cosine: float = 1.0
     sine: float = 0.0
-    angle_kept: float = 0.0  # theta_0 stands for theta in the weight
+    angle_kept: float = 0.0  # in the weight stands 1: theta_0 for theta, 2: theta - theta_0
     drag: float = 1.0
     reference: float = 1.0
     flying_alone: float = 0.0  # 1: v_CM is that of bottle and flying slices; 2: of the water, mean(v) of those that fly
@@ -103,7 +103,7 @@ def _whole(r, v, held, momentum, theta, tube, q):
     inertia += tube.bottle * (q.own_length * tube.own_length + q.own_radius * tube.own_radius)
     inertia += q.shifted * tube.bottle * (tube.length / 2 - centre) ** 2
     omega = momentum / inertia
-    angle = tube.theta0 if q.angle_kept else theta
+    angle = tube.theta0 if q.angle_kept == 1.0 else theta - tube.theta0 if q.angle_kept == 2.0 else theta
     weight = tube.g * (q.cosine * math.cos(angle) + q.sine * math.sin(angle))
     moved = tube.m * flow / (tube.bottle + tube.m * (flying if q.flying_alone == 1.0 else n))
     v_cm = q.reference * moved * (n / max(flying, 1.0) if q.flying_alone == 2.0 else 1.0)

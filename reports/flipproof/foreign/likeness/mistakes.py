@@ -70,13 +70,18 @@ MISTAKES: Final[Mapping[str, Change]] = {
     "the weight goes with sin(theta)": {"cosine": 0.0, "sine": 1.0},
     "the weight goes with -sin(theta)": {"cosine": 0.0, "sine": -1.0},
     "the weight keeps the angle of release": {"angle_kept": 1.0},
+    "the weight takes the angle turned since release for theta": {"angle_kept": 2.0},
     "the centrifugal term takes omega_0 for omega": {"spin_kept": 1.0},
     "the centrifugal term has the wrong sign": {"centrifugal": -1.0},
+    "the centrifugal term has the sign of the spin": lambda s: {"centrifugal": float(np.sign(s.omega0))},
     "slices are thrown away from mean(r) instead of r_CM": {"thrown_from": MEAN},
     "slices are thrown away from L/2 instead of r_CM": {"thrown_from": MIDDLE},
     "slices are thrown away from the cap instead of r_CM": {"thrown_from": CAP},
     "the bottle's share is left out of r_CM": {"tube_in_centre": 0.0},
     "r_CM is mean(r)": lambda s: {"tube_in_centre": 0.0, "water_in_centre": s.total_mass / s.water_mass},
+    "the mass in r_CM and v_CM is that of the full bottle": lambda s: dict.fromkeys(
+        ("tube_in_centre", "water_in_centre", "reference"), s.total_mass / (s.bottle.mass + s.bottle.capacity)
+    ),
     "the bottle's share of r_CM is eps L instead of eps L / 2": {"tube_in_centre": 2.0},
     "slices at rest are left out of r_CM": {"resting_in_centre": 0.0},
     "slices at rest are left out of J": {"resting_in_inertia": 0.0},
@@ -108,6 +113,7 @@ MISTAKES: Final[Mapping[str, Change]] = {
     "a slice at rest is let go by a push without drag, alpha v_CM / m": {"push_drag": 0.0},
     "slices turn at 0 and L instead of h/2N before": {"ends": 0.0},
     "slices turn h/N before the tube's ends instead of h/2N": {"ends": 2.0},
+    "slices turn where those of a half-full bottle do": lambda s: {"ends": 0.5 / s.fill_fraction},
     "slice 0 never moves": {"still": 0.0},
     "the last slice never moves": lambda s: {"still": s.n_slices - 1.0},
 }
