@@ -148,7 +148,7 @@ def test_finer_cells_move_the_plateau_little():
     assert all(0.15 < level < 0.3 for level in levels)
 
 
-@pytest.mark.parametrize("filling", [0.5, 0.75])
+@pytest.mark.parametrize("filling", [pytest.param(0.5, marks=pytest.mark.slow), 0.75])
 def test_particles_that_share_nothing_with_it_turn_the_bottle_alike(filling):
     run = fly(throw(filling), 0.008, "spinning")
     assert run.drift < 1e-12
