@@ -54,6 +54,13 @@ def test_nothing_comparable_fails():
     assert [finding.verdict for finding in found.findings] == ["not evaluated"]
 
 
+def test_a_release_alone_is_nothing_compared():
+    base, twin = of(np.sin(T)), of(np.sin(T) + 0.01 * T)
+    assert not compare(base, of(np.sin(T) + 3e-4 * T), twins=[twin], tolerance=1e-5).passed
+    assert not compare(base, of(np.sin(T) + 3e-4), twins=[twin], tolerance=1e-5).passed
+    assert compare(base, base, twins=[of(np.sin(T) + 1e-7 * T)], tolerance=1e-5).passed
+
+
 def test_a_jump_may_be_a_moment_early_and_a_missing_one_is_named():
     def stairs(*moments):
         return of(sum((moment < T).astype(float) for moment in moments))

@@ -66,8 +66,8 @@ def add_film(commands: Any) -> None:
         "--each", action="store_true", help="every FILE is a film of the same bottle: gamma and restitution are shared"
     )
     fit.add_argument(
-        "--minutes", type=positive, default=10.0, metavar="M", help="give up a search after this many minutes; raise "
-        "it for a slow solver such as mine.py:solve (%(default)g)",
+        "--minutes", type=positive, default=10.0, metavar="M", help="give up a search whose grid takes half of this "
+        "many minutes; raise it for a slow solver such as mine.py:solve (%(default)g)",
     )  # fmt: skip
     fit.set_defaults(kind="fit")
 

@@ -170,7 +170,9 @@ def parser() -> argparse.ArgumentParser:
     report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
     report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     report.add_argument("--out", type=output, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
-    report.add_argument("--quick", action="store_true", help="fewer refinements, no second method, no validity maps")
+    report.add_argument(
+        "--quick", action="store_true", help="fewer refinements; no maps, engine certificates or paper figures"
+    )
     report.add_argument(
         "--slices", type=count, metavar="N", help="slices at which solvers are compared (default 50, or the file's "
         "number if smaller)",

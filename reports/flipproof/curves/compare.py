@@ -141,11 +141,15 @@ class Column:
 
     @property
     def worst(self) -> int | None:
-        """Row of the largest ratio of the difference to what is admissible; None: no row can be compared."""
+        """Row of the largest ratio of the difference to what is admissible; None: no row can be compared.
+
+        That two runs begin alike compares nothing, if no later row can be compared.
+        """
         with np.errstate(all="ignore"):
             ratio = np.nan_to_num(self.gap.size / self.allowed, posinf=np.inf)
         ratio[~self.comparable] = -1.0
-        return int(ratio.argmax()) if self.comparable.any() else None
+        later = self.comparable[1:].any() or len(self.comparable) == 1
+        return int(ratio.argmax()) if self.comparable.any() and (later or self.parted is not None) else None
 
     @property
     def parted(self) -> float | None:
@@ -187,7 +191,7 @@ class Comparison:
             id_, k = f"compare-{_slug(column.name)}", column.worst
             title = f"difference in {column.name} between {self.first} and {self.second}"
             if k is None:
-                note = "no time can be compared: the band is wider than half the tolerance"
+                note = "no time after the first can be compared: the band is wider than half the tolerance"
                 findings.append(regression(id_, title, None, "", (0.0, column.tolerance), note))
                 continue
             count = int(column.comparable.sum())

@@ -29,7 +29,7 @@ SCHEMA: Final = MappingProxyType(
         "base_x": "where the base was clicked [m]",
         "base_y": "",
         "theta": "angle of cap to base from the downward vertical, as clicked, turns counted [rad]",
-        "omega": "five-point average of its central differences [rad/s]",
+        "omega": "five-point average of its central differences [rad/s]; empty where these reach over release or touch",
         "theta_fit": "angle of the fitted flight [rad]; empty outside the flight, as the next three",
         "omega_fit": "its angular velocity [rad/s]",
         "cap_miss": "distance of the click from the fitted cap [m]",
@@ -207,16 +207,19 @@ def frame_grid(table: TrackTable) -> tuple[float, NDArray[np.int64], str]:
     return slope, frames, f"times are frame numbers times {slope:.7g}, the mean time between frames"
 
 
-def smoothed_rate(t: FloatArray, theta: FloatArray) -> FloatArray:
+def smoothed_rate(t: FloatArray, theta: FloatArray, flying: NDArray[np.bool_]) -> FloatArray:
     """Return omega from an angle as in the paper (section 3): central differences, then the mean of five points.
 
-    NaN where one of them is missing.
+    NaN where one of the seven angles is missing, or where some of them are in flight and others are not: hand and table
+    turn the bottle otherwise.
     """
     omega = np.full(len(t), np.nan)
     omega[1:-1] = (theta[2:] - theta[:-2]) / (t[2:] - t[:-2])
     mean = np.full(len(t), np.nan)
-    if len(t) >= 5:
-        mean[2:-2] = np.lib.stride_tricks.sliding_window_view(omega, 5).mean(axis=1)
+    if len(t) >= 7:
+        in_flight = np.lib.stride_tricks.sliding_window_view(flying, 7).sum(axis=1)
+        rates = np.lib.stride_tricks.sliding_window_view(omega[1:-1], 5).mean(axis=1)
+        mean[3:-3] = np.where((in_flight == 0) | (in_flight == 7), rates, np.nan)
     return mean
 
 

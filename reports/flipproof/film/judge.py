@@ -268,8 +268,9 @@ class Assessment:
             raise UnsoundError(
                 f"{estimate.film.label}: {1e3 * hand.seconds:.0f} ms before the release at {release:.3f} s the bottle "
                 "falls freely by its clicks alone: the flight begins earlier, and no fit was found that says so: does "
-                "the film begin after the release, or is it another bottle than that of --scenario "
-                f"({estimate.throw.fill_fraction:.0%} full)? click the frames there again, or give --release"
+                "the film begin after the release, does another equation hold (fit it beside --model free-flight), or "
+                f"is it another bottle than that of --scenario ({estimate.throw.fill_fraction:.0%} full)? click the "
+                "frames there again, or give --release"
             )
 
     def _check_rates(self) -> None:

@@ -39,8 +39,9 @@ def track_csv(assessment: Assessment) -> str:
         _, _, residuals = estimate.likelihood.per_click(estimate.curve, estimate.fit.x)
         misses = np.where(film.clicked & inside, np.hypot(*np.moveaxis(residuals, 2, 0)), np.nan)
     mask = np.where(inside, 1.0, np.nan)
+    omega = smoothed_rate(t, theta, inside)
     columns = (
-        t, *points[0].T, *points[1].T, theta, smoothed_rate(t, theta), theta_fit * mask, omega_fit * mask, *misses,
+        t, *points[0].T, *points[1].T, theta, omega, theta_fit * mask, omega_fit * mask, *misses,
         *doubted.astype(int), inside.astype(int), (t - release) / (touch - release), film.lines,
     )  # fmt: skip
     return schema_comments() + rows_csv(list(SCHEMA), zip(*columns, strict=True), digits=None)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flipproof.cli.main import main
-from flipproof.film.clip import SCHEMA, read_film
+from flipproof.film.clip import SCHEMA, read_film, smoothed_rate
 from flipproof.film.estimate import NoFlightError, estimate, exchange_gain, exchanged, settle, shortest
 from flipproof.film.fall import hand_share
 from flipproof.film.judge import EXCHANGED, Assessment, UnsoundError, shared_draws
@@ -467,3 +467,15 @@ def test_a_spoiled_film_is_estimated_or_refused(seeds):
         assert bool(message) != bool(draws)
         assert "\n" not in message
         assert all(np.isfinite(values).all() for values in draws.values())
+
+
+def test_a_measured_rate_reaches_over_neither_release_nor_touch():
+    t = np.linspace(0.0, 1.0, 101)
+    flying = (t > 0.295) & (t < 0.795)
+    turned = np.where(t < 0.295, 5.0 * t, np.where(flying, 1.475 + 20.0 * (t - 0.295), 11.475))
+    rate = smoothed_rate(t, turned, flying)
+    known = ~np.isnan(rate)
+    np.testing.assert_allclose(rate[known & flying], 20.0, rtol=1e-12)
+    np.testing.assert_allclose(rate[known & (t < 0.29)], 5.0, rtol=1e-12)
+    assert np.count_nonzero(known & flying) == np.count_nonzero(flying) - 6
+    assert np.count_nonzero(known) == len(t) - 18
