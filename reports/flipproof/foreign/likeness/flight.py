@@ -10,7 +10,7 @@ omega_0 on the throws of ``mistakes``. It shares no code with ``ode_reference``.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -50,7 +50,6 @@ class Mistake(NamedTuple):
     rest_speed: float = 1e-6  # [L omega_0]
     rest_height: float = 0.0  # of the next bounce [L]
     rests_if_pressed: float = 0.0  # a slice rests at its first impact if its end presses it
-    push_centrifugal: float = 1.0
     push_weight: float = 1.0
     push_drag: float = 1.0
     let_go_base: float = 1.0
@@ -80,6 +79,7 @@ class Tube(NamedTuple):
 
 @merged
 def _point(which, centre, mean, length):
+    """Return the point that a switch names, from the cap."""
     return centre if which == 0.0 else mean if which == MEAN else length / 2 if which == MIDDLE else 0.0
 
 
@@ -112,6 +112,7 @@ def _whole(r, v, held, momentum, theta, tube, q):
 
 @merged
 def _slope(y, held, n, momentum, tube, q, dy):
+    """Write the rate of the state (theta, r, v)."""
     r, v = y[1 : n + 1], y[n + 1 :]
     omega, spin, x, weight, v_cm = _whole(r, v, held, momentum, y[0], tube, q)
     dy[0] = omega
@@ -123,19 +124,15 @@ def _slope(y, held, n, momentum, tube, q, dy):
 
 
 @merged
-def _advance(y, h, held, n, momentum, tube, q, a, b, c, d, middle, new):
-    _slope(y, held, n, momentum, tube, q, a)
+def _advance(y, h, held, n, momentum, tube, q, slopes, middle, new):
+    """Write the state after a step h of Runge and Kutta's method; ``slopes`` is work space, shape (4, 2 N + 1)."""
+    for stage in range(4):
+        share = 0.0 if stage == 0 else 1.0 if stage == 3 else 0.5
+        for i in range(len(y)):
+            middle[i] = y[i] + (share * h * slopes[stage - 1, i] if stage > 0 else 0.0)
+        _slope(middle, held, n, momentum, tube, q, slopes[stage])
     for i in range(len(y)):
-        middle[i] = y[i] + h / 2 * a[i]
-    _slope(middle, held, n, momentum, tube, q, b)
-    for i in range(len(y)):
-        middle[i] = y[i] + h / 2 * b[i]
-    _slope(middle, held, n, momentum, tube, q, c)
-    for i in range(len(y)):
-        middle[i] = y[i] + h * c[i]
-    _slope(middle, held, n, momentum, tube, q, d)
-    for i in range(len(y)):
-        new[i] = y[i] + h / 6 * (a[i] + 2 * b[i] + 2 * c[i] + d[i])
+        new[i] = y[i] + h / 6 * (slopes[0, i] + 2 * slopes[1, i] + 2 * slopes[2, i] + slopes[3, i])
 
 
 @merged
@@ -143,7 +140,7 @@ def _push(y, side, held, n, momentum, tube, q):
     """Return the force a mass outward on a slice at rest on an end."""
     _, spin, x, weight, v_cm = _whole(y[1 : n + 1], y[n + 1 :], held, momentum, y[0], tube, q)
     end = tube.high if side > 0 else tube.low
-    thrown = q.push_centrifugal * q.centrifugal * spin * spin * (end - x)
+    thrown = q.centrifugal * spin * spin * (end - x)
     return side * (thrown + q.push_weight * weight + q.push_drag * q.drag * tube.k * v_cm)
 
 
@@ -214,20 +211,13 @@ def _fly(times, start, step, tube, q, max_events):
     for i in range(n):
         if held[i] != 0 and _lets_go(y, i, held, n, momentum, tube, q):
             held[i] = 0
-    a, b, c, d, middle, new = (
-        np.empty(len(y)),
-        np.empty(len(y)),
-        np.empty(len(y)),
-        np.empty(len(y)),
-        np.empty(len(y)),
-        np.empty(len(y)),
-    )
+    slopes, middle, new = np.empty((4, len(y))), np.empty(len(y)), np.empty(len(y))
     omega = np.full(len(times), np.nan)
     t, events = 0.0, 0
     for k in range(len(times)):
         while t < times[k]:
             h = min(step, times[k] - t)
-            _advance(y, h, held, n, momentum, tube, q, a, b, c, d, middle, new)
+            _advance(y, h, held, n, momentum, tube, q, slopes, middle, new)
             if _happens(new, held, n, momentum, tube, q):
                 events += 1
                 if events > max_events:
@@ -235,13 +225,13 @@ def _fly(times, start, step, tube, q, max_events):
                 low, high = 0.0, h
                 for _ in range(50):
                     h = (low + high) / 2
-                    _advance(y, h, held, n, momentum, tube, q, a, b, c, d, middle, new)
+                    _advance(y, h, held, n, momentum, tube, q, slopes, middle, new)
                     if _happens(new, held, n, momentum, tube, q):
                         high = h
                     else:
                         low = h
                 h = high
-                _advance(y, h, held, n, momentum, tube, q, a, b, c, d, middle, new)
+                _advance(y, h, held, n, momentum, tube, q, slopes, middle, new)
                 _react(new, held, n, momentum, tube, q)
             y[:] = new
             t = times[k] if h >= times[k] - t else t + h
@@ -249,8 +239,9 @@ def _fly(times, start, step, tube, q, max_events):
     return omega
 
 
-STEPS = 1000
-MAX_EVENTS = 2000
+STEPS: Final = 1000
+MAX_EVENTS: Final = 2000
+"""Steps of a flight without impacts, and impacts and releases after which it ends."""
 
 
 def fly(ask: Ask, mistake: Mistake) -> FloatArray:
