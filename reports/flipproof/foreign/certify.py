@@ -65,7 +65,7 @@ A new check is one generator and one line here.
 OF_MOTION: Final = frozenset(
     ("piecewise", "angular-momentum", "angle", "restitution", "equation", "gravity", "mirror", "elsewhere")
 )
-"""Checks that may fail because of a known mistake in Eq. 8; if one gives the same answers, their advice names it."""
+"""Checks that may fail because of a known mistake; if one gives the same answers, their advice names it."""
 
 ENOUGH: Final = "enough"
 """The last line of the whole suite: whether at least half of the checks could run."""

@@ -417,7 +417,7 @@ def test_slow_impacts_need_not_be_answered():
 def test_what_an_impact_spoils_is_named_as_the_impacts():
     (result,) = certify(InProcess(MISTAKES["WallsAtTheEnds"](), "x"), ["restitution"]).results
     assert "slices turn" in result.line
-    assert "h = water mass / capacity x L / N" in result.line
+    assert "in which slices turn at 0 and L instead of h/2N before" in result.line
     equation, gravity = certify(InProcess(ThickEnds(), "x"), ["equation", "gravity"]).results
     assert "look at impacts" in equation.line
     assert gravity.verdict != FAILED

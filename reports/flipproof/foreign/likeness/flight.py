@@ -1,15 +1,19 @@
-"""Eq. 8 with a mistake in it: one flight whose every term has a factor.
+"""Eq. 8 or free flight with a mistake in it: one flight whose every term has a factor.
 
-    r_i'' = centrifugal omega^2 (r_i - x) + g (cosine cos(theta) + sine sin(theta)) - drag k (v_i - reference v_CM)
+    r_i'' = centrifugal omega^2 (r_i - x) + g (cosine cos(theta) + sine sin(theta)) - drag k (v_i - u)
+    u     = reference v_CM - reaction (m / M_c) sum_free v_j
 
-with k = alpha / m and x the point from which slices are thrown outward. Factors of 1 and switches of 0 are Eq. 8 as it
-should be. Runge-Kutta steps of order 4; impacts and releases are located by bisection. omega is accurate to 1e-8 of
-omega_0 on the throws of ``mistakes``. It shares no code with ``ode_reference``.
+with k = alpha / m, x the point from which slices are thrown outward, and M_c the mass of the tube with what rests in
+it. An impact changes the velocity of the tube by ``recoil`` times its impulse over M_b. The factors as they stand in
+``Mistake`` are Eq. 8 as it should be, with those of ``FREE`` free flight. Runge-Kutta steps of order 4; impacts and
+releases are located by bisection. omega is accurate to 1e-8 of omega_0 on the throws of ``mistakes``. It shares no
+code with ``ode_reference``.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -18,8 +22,17 @@ from flipproof.foreign.contract import Ask
 from slicemodel.compiled import kept_on_disk, merged
 from slicemodel.trajectory import FloatArray
 
-MEAN, MIDDLE, CAP = 1.0, 2.0, 3.0
-"""Points that may stand in the place of r_CM (0): mean(r), L/2 and the cap."""
+CENTRE, MEAN, MIDDLE, CAP, BODY = 0.0, 1.0, 2.0, 3.0, 4.0
+"""Points from which slices may be thrown: r_CM, mean(r), L/2, the cap, the centre of the tube with what rests in it."""
+
+FREE: Final[Mapping[str, float]] = {
+    "thrown_from": BODY,
+    "cosine": 0.0,
+    "reference": 0.0,
+    "reaction": 1.0,
+    "recoil": 1.0,
+}
+"""What free flight has otherwise than Eq. 8."""
 
 
 class Mistake(NamedTuple):
@@ -43,6 +56,9 @@ class Mistake(NamedTuple):
     drag: float = 1.0
     reference: float = 1.0
     flying_alone: float = 0.0  # 1: v_CM is that of bottle and flying slices; 2: of the water, mean(v) of those that fly
+    reaction: float = 0.0  # of the drag, on the body
+    reaction_on_tube: float = 0.0  # ... on the tube alone
+    recoil: float = 0.0
     e_base: float = 1.0
     e_cap: float = 1.0
     e_power: float = 1.0
@@ -78,25 +94,30 @@ class Tube(NamedTuple):
 
 
 @merged
-def _point(which, centre, mean, length):
+def _point(which, centre, mean, length, body):
     """Return the point that a switch names, from the cap."""
-    return centre if which == 0.0 else mean if which == MEAN else length / 2 if which == MIDDLE else 0.0
+    if which == BODY:
+        return body
+    return centre if which == CENTRE else mean if which == MEAN else length / 2 if which == MIDDLE else 0.0
 
 
 @merged
 def _whole(r, v, held, momentum, theta, tube, q):
-    """Return omega, the spin that throws slices and from where, the weight, and v_CM."""
+    """Return omega, the spin that throws slices and from where, the weight, and the velocity that drag is against."""
     n = len(r)
-    total, squares, flow, all_r, flying = 0.0, 0.0, 0.0, 0.0, 0.0
+    total, squares, flow, all_r, flying, resting = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         all_r += r[i]
         total += r[i] * (q.resting_in_centre if held[i] != 0 else 1.0)
         flow += v[i]
         flying += 1.0 if held[i] == 0 else 0.0
+        resting += r[i] if held[i] != 0 else 0.0
     mass = tube.bottle + tube.m * n
     mean = all_r / n
+    body_mass = tube.bottle + tube.m * (n - flying)
+    body = (tube.bottle * tube.length / 2 + tube.m * resting) / body_mass
     centre = (q.water_in_centre * tube.m * total + q.tube_in_centre * tube.bottle * tube.length / 2) / mass
-    about = _point(q.moments_about, centre, mean, tube.length)
+    about = _point(q.moments_about, centre, mean, tube.length, body)
     for i in range(n):
         squares += (r[i] - about) ** 2 * (q.resting_in_inertia if held[i] != 0 else 1.0)
     inertia = q.water_in_inertia * tube.m * squares
@@ -106,20 +127,22 @@ def _whole(r, v, held, momentum, theta, tube, q):
     angle = tube.theta0 if q.angle_kept == 1.0 else theta - tube.theta0 if q.angle_kept == 2.0 else theta
     weight = tube.g * (q.cosine * math.cos(angle) + q.sine * math.sin(angle))
     moved = tube.m * flow / (tube.bottle + tube.m * (flying if q.flying_alone == 1.0 else n))
-    v_cm = q.reference * moved * (n / max(flying, 1.0) if q.flying_alone == 2.0 else 1.0)
-    return omega, tube.omega0 if q.spin_kept else omega, _point(q.thrown_from, centre, mean, tube.length), weight, v_cm
+    against = q.reference * moved * (n / max(flying, 1.0) if q.flying_alone == 2.0 else 1.0)
+    against -= q.reaction * tube.m * flow / (tube.bottle if q.reaction_on_tube else body_mass)
+    x = _point(q.thrown_from, centre, mean, tube.length, body)
+    return omega, tube.omega0 if q.spin_kept else omega, x, weight, against
 
 
 @merged
 def _slope(y, held, n, momentum, tube, q, dy):
     """Write the rate of the state (theta, r, v)."""
     r, v = y[1 : n + 1], y[n + 1 :]
-    omega, spin, x, weight, v_cm = _whole(r, v, held, momentum, y[0], tube, q)
+    omega, spin, x, weight, against = _whole(r, v, held, momentum, y[0], tube, q)
     dy[0] = omega
     for i in range(n):
         moves = held[i] == 0 and i != q.still
         dy[1 + i] = v[i] if moves else 0.0
-        push = q.centrifugal * spin * spin * (r[i] - x) + weight - q.drag * tube.k * (v[i] - v_cm)
+        push = q.centrifugal * spin * spin * (r[i] - x) + weight - q.drag * tube.k * (v[i] - against)
         dy[1 + n + i] = push if moves else 0.0
 
 
@@ -138,10 +161,10 @@ def _advance(y, h, held, n, momentum, tube, q, slopes, middle, new):
 @merged
 def _push(y, side, held, n, momentum, tube, q):
     """Return the force a mass outward on a slice at rest on an end."""
-    _, spin, x, weight, v_cm = _whole(y[1 : n + 1], y[n + 1 :], held, momentum, y[0], tube, q)
+    _, spin, x, weight, against = _whole(y[1 : n + 1], y[n + 1 :], held, momentum, y[0], tube, q)
     end = tube.high if side > 0 else tube.low
     thrown = q.centrifugal * spin * spin * (end - x)
-    return side * (thrown + q.push_weight * weight + q.push_drag * q.drag * tube.k * v_cm)
+    return side * (thrown + q.push_weight * weight + q.push_drag * q.drag * tube.k * against)
 
 
 @merged
@@ -169,29 +192,64 @@ def _happens(y, held, n, momentum, tube, q):
 
 
 @merged
-def _react(y, held, n, momentum, tube, q):
-    """Change the state by all impacts and releases of one instant."""
-    scale = tube.length * abs(tube.omega0)
+def _e(v, side, tube, q):
+    """Return by what an impact multiplies the speed of a slice."""
+    if abs(v) < q.least_speed * tube.length * abs(tube.omega0):
+        return 0.0
+    return (q.e_base if side > 0 else q.e_cap) * tube.e**q.e_power
+
+
+@merged
+def _react(y, held, contact, pressed, n, momentum, tube, q):
+    """Change the state by all impacts and releases of one instant: Newton's law with Moreau's condition.
+
+    The impulses that act are those of ``pressed``: with d_i = (1 + e) v_i and R = recoil / M_b the tube's velocity
+    changes by R m sum d_i / (1 + R m sum 1), both sums over them, and d_i less that must point outward for each.
+    """
+    given = q.recoil / tube.bottle
     for i in range(n):
-        if held[i] != 0:
-            if _lets_go(y, i, held, n, momentum, tube, q):
-                held[i] = 0
-            continue
-        v = y[1 + n + i]
-        side = 1 if y[1 + i] >= tube.high and v > 0.0 else -1 if y[1 + i] <= tube.low and v < 0.0 else 0
+        if held[i] != 0 and _lets_go(y, i, held, n, momentum, tube, q):
+            held[i] = 0
+        r, v = y[1 + i], y[1 + n + i]
+        struck = 1 if r >= tube.high and v > 0.0 else -1 if r <= tube.low and v < 0.0 else 0
+        contact[i] = held[i] if held[i] != 0 else struck
+        pressed[i] = contact[i] != 0
+    moved = 0.0
+    for _ in range(2 * n + 2):
+        total, count, changes = 0.0, 0, False
+        for i in range(n):
+            if pressed[i]:
+                total += (1.0 + _e(y[1 + n + i], contact[i], tube, q)) * y[1 + n + i]
+                count += 1
+        moved = given * tube.m * total / (1.0 + given * tube.m * count)
+        for i in range(n):
+            if contact[i] != 0:
+                presses = contact[i] * ((1.0 + _e(y[1 + n + i], contact[i], tube, q)) * y[1 + n + i] - moved) > 0.0
+                changes = changes or presses != pressed[i]
+                pressed[i] = presses
+        if not changes:
+            break
+    scale, stopped, stops = tube.length * abs(tube.omega0), 0.0, 0
+    for i in range(n):
+        v, side = y[1 + n + i], contact[i]
+        after = -_e(v, side, tube, q) * v if pressed[i] else v - moved
+        if i != q.still:
+            y[1 + n + i] = after
         if side == 0:
             continue
-        e = (q.e_base if side > 0 else q.e_cap) * tube.e**q.e_power
-        speed = 0.0 if abs(v) < q.least_speed * scale else e * abs(v)
         y[1 + i] = tube.high if side > 0 else tube.low
-        y[1 + n + i] = -side * speed
-        low = speed * speed < 2.0 * q.rest_height * tube.length * _push(y, side, held, n, momentum, tube, q)
-        if speed < q.rest_speed * scale or low or q.rests_if_pressed:
-            held[i] = side
-            y[1 + n + i] = 0.0
-            if _lets_go(y, i, held, n, momentum, tube, q):
-                held[i] = 0
-                y[1 + n + i] = -side * speed
+        struck, held[i] = held[i] == 0, side
+        low = after * after < 2.0 * q.rest_height * tube.length * _push(y, side, held, n, momentum, tube, q)
+        rests = abs(after) < q.rest_speed * scale or (struck and (low or q.rests_if_pressed))
+        if not rests or (struck and _lets_go(y, i, held, n, momentum, tube, q)):
+            held[i] = 0
+        else:
+            stopped += after
+            stops += 1
+    # They stop against the tube, which takes their momentum.
+    shift = given * tube.m * stopped / (1.0 + given * tube.m * stops)
+    for i in range(n):
+        y[1 + n + i] = 0.0 if held[i] != 0 or i == q.still else y[1 + n + i] - shift
 
 
 @kept_on_disk()
@@ -201,7 +259,7 @@ def _fly(times, start, step, tube, q, max_events):
     y = np.zeros(2 * n + 1)
     y[0] = tube.theta0
     y[1 : n + 1] = start
-    held = np.zeros(n, np.int64)
+    held, contact, pressed = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.bool_)
     momentum = 1.0
     momentum = tube.omega0 / _whole(y[1 : n + 1], y[n + 1 :], held, momentum, y[0], tube, q)[0]
     near = 1e-9 * tube.length
@@ -232,7 +290,7 @@ def _fly(times, start, step, tube, q, max_events):
                         low = h
                 h = high
                 _advance(y, h, held, n, momentum, tube, q, slopes, middle, new)
-                _react(new, held, n, momentum, tube, q)
+                _react(new, held, contact, pressed, n, momentum, tube, q)
             y[:] = new
             t = times[k] if h >= times[k] - t else t + h
         omega[k] = _whole(y[1 : n + 1], y[n + 1 :], held, momentum, y[0], tube, q)[0]
@@ -245,7 +303,7 @@ MAX_EVENTS: Final = 2000
 
 
 def fly(ask: Ask, mistake: Mistake) -> FloatArray:
-    """Return omega at the times of an ask, shape (P,) [rad/s], by Eq. 8 with a mistake; NaN from too many events on."""
+    """Return omega at the times of an ask, shape (P,) [rad/s], with a mistake; NaN from too many events on."""
     s, bottle = ask.scenario, ask.scenario.bottle
     inset = mistake.ends * s.slice_height / 2
     m = mistake.slice_mass * s.slice_mass

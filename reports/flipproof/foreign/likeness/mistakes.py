@@ -1,7 +1,7 @@
-"""Known mistakes in Eq. 8, and which of them gives a solver's answers.
+"""Known mistakes in Eq. 8 and in free flight, and which of them gives a solver's answers.
 
 A mistake is named if its flight is the solver's on every one of ``THROWS``, within the solver's own error, and that of
-Eq. 8 is not. The throws differ in slices, restitution, drag, weight and start, so that two mistakes seldom agree.
+its equation is not. The throws differ in slices, restitution, drag, weight and start, so that mistakes seldom agree.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.elsewhere import WHOLE, TextGenerator
-from flipproof.foreign.likeness.flight import CAP, MEAN, MIDDLE, Mistake, fly
+from flipproof.foreign.likeness.flight import CAP, CENTRE, FREE, MEAN, MIDDLE, Mistake, fly
 from flipproof.foreign.place import name_of, switches_of
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
@@ -44,44 +44,27 @@ UNREFINED: Final = 1e-4
 """Own error of a solver that cannot be refined."""
 
 FAR: Final = 10.0
-"""Rooms by which Eq. 8 must be off at least where a mistake is named."""
+"""Rooms by which the equation must be off at least where a mistake is named."""
 
 NEARER: Final = 20.0
-"""How much nearer than Eq. 8 a mistake must be on throws that it does not explain, to be named as near."""
+"""How much nearer than its equation a mistake must be on throws that it does not explain, to be named as near."""
 
 Factors = Mapping[str, float]
 Change = Factors | Callable[[Scenario], Factors]
 """Factors and switches of a flight; a function gives them for a throw."""
 
-MISTAKES: Final[Mapping[str, Change]] = {
+COMMON: Final[Mapping[str, Change]] = {
     "drag is missing": {"drag": 0.0},
     "drag drives slices instead of slowing them": {"drag": -1.0},
-    "drag is taken against the tube instead of C_M": {"reference": 0.0},
-    "drag is taken against mean(v) instead of v_CM": lambda s: {"reference": s.total_mass / s.water_mass},
-    "drag is taken against minus v_CM": {"reference": -1.0},
-    "v_CM leaves out the mass of slices at rest": {"flying_alone": 1.0},
-    "v_CM takes the mean velocity of the flying slices for that of all": {"flying_alone": 2.0},
     "alpha is divided by the mass of all the water instead of a slice's": lambda s: {"drag": 1.0 / s.n_slices},
     "alpha is not divided by the mass of a slice": lambda s: {"drag": s.slice_mass},
     "a slice weighs M_w / (N + 1)": lambda s: {"slice_mass": s.n_slices / (s.n_slices + 1)},
     "a slice weighs M_w / (N - 1)": lambda s: {"slice_mass": s.n_slices / (s.n_slices - 1)},
-    "the weight is missing": {"cosine": 0.0},
-    "the weight has the wrong sign": {"cosine": -1.0},
-    "the weight goes with sin(theta)": {"cosine": 0.0, "sine": 1.0},
-    "the weight goes with -sin(theta)": {"cosine": 0.0, "sine": -1.0},
-    "the weight keeps the angle of release": {"angle_kept": 1.0},
-    "the weight takes the angle turned since release for theta": {"angle_kept": 2.0},
     "the centrifugal term takes omega_0 for omega": {"spin_kept": 1.0},
     "the centrifugal term has the wrong sign": {"centrifugal": -1.0},
     "the centrifugal term has the sign of the spin": lambda s: {"centrifugal": float(np.sign(s.omega0))},
-    "slices are thrown away from mean(r) instead of r_CM": {"thrown_from": MEAN},
-    "slices are thrown away from L/2 instead of r_CM": {"thrown_from": MIDDLE},
-    "slices are thrown away from the cap instead of r_CM": {"thrown_from": CAP},
     "the bottle's share is left out of r_CM": {"tube_in_centre": 0.0},
     "r_CM is mean(r)": lambda s: {"tube_in_centre": 0.0, "water_in_centre": s.total_mass / s.water_mass},
-    "the mass in r_CM and v_CM is that of the full bottle": lambda s: dict.fromkeys(
-        ("tube_in_centre", "water_in_centre", "reference"), s.total_mass / (s.bottle.mass + s.bottle.capacity)
-    ),
     "the bottle's share of r_CM is eps L instead of eps L / 2": {"tube_in_centre": 2.0},
     "slices at rest are left out of r_CM": {"resting_in_centre": 0.0},
     "slices at rest are left out of J": {"resting_in_inertia": 0.0},
@@ -107,10 +90,7 @@ MISTAKES: Final[Mapping[str, Change]] = {
     "impacts on the cap are elastic": lambda s: {"e_cap": 1.0 / s.restitution},
     "a slice rests at its first impact if its end presses it": {"rests_if_pressed": 1.0},
     "a slice at rest is never let go": {"let_go_base": 0.0, "let_go_cap": 0.0},
-    "a slice at rest on the base is never let go": {"let_go_base": 0.0},
     "a slice at rest on the cap is never let go": {"let_go_cap": 0.0},
-    "a slice at rest is let go by a push without its weight": {"push_weight": 0.0},
-    "a slice at rest is let go by a push without drag, alpha v_CM / m": {"push_drag": 0.0},
     "slices turn at 0 and L instead of h/2N before": {"ends": 0.0},
     "slices turn h/N before the tube's ends instead of h/2N": {"ends": 2.0},
     "slices turn where those of a half-full bottle do": lambda s: {"ends": 0.5 / s.fill_fraction},
@@ -118,6 +98,58 @@ MISTAKES: Final[Mapping[str, Change]] = {
     "the last slice never moves": lambda s: {"still": s.n_slices - 1.0},
 }
 """What is wrong -> what it changes; the words follow "it answers like a solver in which"."""
+
+OF_EQ8: Final[Mapping[str, Change]] = {
+    "drag is taken against the tube instead of C_M": {"reference": 0.0},
+    "drag is taken against mean(v) instead of v_CM": lambda s: {"reference": s.total_mass / s.water_mass},
+    "drag is taken against minus v_CM": {"reference": -1.0},
+    "v_CM leaves out the mass of slices at rest": {"flying_alone": 1.0},
+    "v_CM takes the mean velocity of the flying slices for that of all": {"flying_alone": 2.0},
+    "the weight is missing": {"cosine": 0.0},
+    "the weight has the wrong sign": {"cosine": -1.0},
+    "the weight goes with sin(theta)": {"cosine": 0.0, "sine": 1.0},
+    "the weight goes with -sin(theta)": {"cosine": 0.0, "sine": -1.0},
+    "the weight keeps the angle of release": {"angle_kept": 1.0},
+    "the weight takes the angle turned since release for theta": {"angle_kept": 2.0},
+    "slices are thrown away from mean(r) instead of r_CM": {"thrown_from": MEAN},
+    "slices are thrown away from L/2 instead of r_CM": {"thrown_from": MIDDLE},
+    "slices are thrown away from the cap instead of r_CM": {"thrown_from": CAP},
+    "the mass in r_CM and v_CM is that of the full bottle": lambda s: dict.fromkeys(
+        ("tube_in_centre", "water_in_centre", "reference"), s.total_mass / (s.bottle.mass + s.bottle.capacity)
+    ),
+    "a slice at rest on the base is never let go": {"let_go_base": 0.0},
+    "a slice at rest is let go by a push without its weight": {"push_weight": 0.0},
+    "a slice at rest is let go by a push without drag, alpha v_CM / m": {"push_drag": 0.0},
+}
+"""The same of Eq. 8 alone."""
+
+OF_FREE_FLIGHT: Final[Mapping[str, Change]] = {
+    "gravity pulls slices along the bottle, g cos(theta)": {"cosine": 1.0},
+    "the tube does not feel the drag of the slices": {"reaction": 0.0},
+    "the tube feels the drag of the slices in the wrong direction": {"reaction": -1.0},
+    "the drag of the slices moves the tube without the slices that rest in it": {"reaction_on_tube": 1.0},
+    "the drag of the slices moves the mass of bottle and water": lambda s: {
+        "reaction": s.bottle.mass / s.total_mass,
+        "reaction_on_tube": 1.0,
+    },
+    "drag is taken against C_M instead of the tube": {"reference": 1.0, "reaction": 0.0},
+    "slices are thrown away from r_CM instead of the centre of the tube with what rests in it": {"thrown_from": CENTRE},
+    "slices are thrown away from L/2 also while slices rest": {"thrown_from": MIDDLE},
+    "slices are thrown away from mean(r)": {"thrown_from": MEAN},
+    "slices are thrown away from the cap": {"thrown_from": CAP},
+    "an impact does not move the tube": {"recoil": 0.0},
+    "an impact moves the tube as if it had the mass of bottle and water": lambda s: {
+        "recoil": s.bottle.mass / s.total_mass
+    },
+    "a slice at rest is let go by a push without the drag on the tube": {"push_drag": 0.0},
+}
+"""The same of free flight alone."""
+
+MISTAKES: Final[Mapping[str, tuple[Factors, Mapping[str, Change]]]] = {
+    "eq8": ({}, {**COMMON, **OF_EQ8}),
+    "free-flight": (FREE, {**COMMON, **OF_FREE_FLIGHT}),
+}
+"""Equation -> the factors that make it, and the mistakes in it."""
 
 SLOW: Final[Mapping[str, tuple[str, str, str]]] = {
     "a slice rests as soon as it leaves an end slower than about {}": ("rest_speed", "L omega_0", "m/s"),
@@ -133,6 +165,8 @@ FITTED: Final[Mapping[str, tuple[str, ...]]] = {
     "the drag counts {:.3g} times": ("drag",),
     "v_CM counts {:.3g} times in the drag": ("reference",),
     "the weight counts {:.3g} times": ("cosine",),
+    "the drag on the tube counts {:.3g} times": ("reaction",),
+    "the recoil of the tube counts {:.3g} times": ("recoil",),
     "the centrifugal term counts {:.3g} times": ("centrifugal",),
     "the bottle weighs {:.3g} of M_b": ("bottle",),
     "the bottle counts {:.3g} times in r_CM": ("tube_in_centre",),
@@ -146,7 +180,7 @@ FITTED: Final[Mapping[str, tuple[str, ...]]] = {
     "an impact on the cap multiplies the speed by {:.3g} e": ("e_cap",),
     "slices turn {:.3g} x h/2N before the tube's ends": ("ends",),
 }
-"""What is wrong by a factor, the same on every throw -> what the factor stands before."""
+"""What is wrong by a factor, the same on every throw -> what the factor stands before, where that acts at all."""
 
 GRID: Final = np.concatenate([[-1.0, -0.5, 0.0], np.geomspace(0.1, 8.0, 40)])
 """Factors tried first."""
@@ -165,11 +199,12 @@ class _Flown:
     ask: Ask
     omega: FloatArray
     room: FloatArray
+    equation: Factors
 
     def off(self, change: Change) -> FloatArray:
         """Return by how many rooms the flight with a mistake is off at each time."""
         factors = change(self.ask.scenario) if callable(change) else change
-        omega = fly(self.ask, Mistake(**factors)) / abs(self.ask.scenario.omega0)
+        omega = fly(self.ask, Mistake(**{**self.equation, **factors})) / abs(self.ask.scenario.omega0)
         return np.nan_to_num(np.abs(omega[: len(self.omega)] - self.omega) / self.room, nan=1e9)
 
     def excess(self, change: Change) -> float:
@@ -180,9 +215,8 @@ class _Flown:
 def naming(traits: Traits) -> TextGenerator:
     """Return "it answers like a solver in which" and the mistake that gives its answers, or two; empty if none does."""
     try:
-        if traits.equation is None or name_of(switches_of(traits.equation)) != "eq8":
-            return ""
-    except ValueError:
+        equation, mistakes = MISTAKES[name_of(switches_of(traits.equation or ""))]
+    except (ValueError, KeyError):
         return ""
     flown = []
     for knobs in THROWS:
@@ -190,23 +224,28 @@ def naming(traits: Traits) -> TextGenerator:
         levels = LEVELS[::-1] if traits.refined_by else (0,)
         with suppress(ForeignError):
             answers = yield [replace(ask, effort=effort_of(traits, ask.scenario, level)) for level in levels]
-            flown.append(_flown(traits, ask, answers))
+            flown.append(_flown(traits, ask, answers, equation))
     if len(flown) < 2 or not max(one.excess({}) for one in flown) > FAR:
         return ""
-    named = [words for words, change in MISTAKES.items() if _explains(flown, change)]
+    named = [words for words, change in mistakes.items() if _explains(flown, change)]
     named = named or [text for words, how in SLOW.items() if (text := _slow(flown, words, *how))]
-    named = named or [text for words, fields in FITTED.items() if (text := _fitted(flown, words, fields))]
-    nearly = [] if named else [words for words, change in MISTAKES.items() if _nearly_explains(flown, change)]
+    acts = Mistake(**equation)._asdict()
+    named = named or [
+        text
+        for words, fields in FITTED.items()
+        if all(acts[field] for field in fields) and (text := _fitted(flown, words, fields))
+    ]
+    nearly = [] if named else [words for words, change in mistakes.items() if _nearly_explains(flown, change)]
     answers_like = f"it answers {'nearly ' if nearly else ''}like a solver in which"
     return f"{answers_like} {' or '.join((named or nearly)[:2])}" if named or nearly else ""
 
 
-def _flown(traits: Traits, ask: Ask, answers: Sequence[Answer]) -> _Flown:
+def _flown(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: Factors) -> _Flown:
     spin, fine = abs(ask.scenario.omega0), answers[0].omega
     own = np.maximum.accumulate(np.abs(fine - answers[1].omega)) / spin if answers[1:] else UNREFINED
     room = np.broadcast_to(max(FLOOR, 64 * traits.epsilon) + 3.0 * own, fine.shape)
     clear = int(np.sum(np.logical_and.accumulate(room <= CLEAR)))
-    return _Flown(ask, fine[:clear] / spin, room[:clear])
+    return _Flown(ask, fine[:clear] / spin, room[:clear], equation)
 
 
 def _explains(flown: Sequence[_Flown], change: Change) -> bool:
@@ -215,10 +254,10 @@ def _explains(flown: Sequence[_Flown], change: Change) -> bool:
 
 
 def _nearly_explains(flown: Sequence[_Flown], change: Change) -> bool:
-    """Return whether a mistake leads to the answers on a throw, and on the others is ``NEARER`` to them than Eq. 8."""
+    """Return whether a mistake leads to the answers on a throw, and on the others is ``NEARER`` than without it."""
     distances = [(one.excess(change), one.excess({})) for one in flown]
-    exact = sum(distance <= 1.0 and eq8 > FAR for distance, eq8 in distances)
-    return exact >= 1 and all(distance <= max(1.0, eq8 / NEARER) for distance, eq8 in distances)
+    exact = sum(distance <= 1.0 and without > FAR for distance, without in distances)
+    return exact >= 1 and all(distance <= max(1.0, without / NEARER) for distance, without in distances)
 
 
 def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> str:
