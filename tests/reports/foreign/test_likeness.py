@@ -1,6 +1,7 @@
 """A mistake is named by its own flights: held to the reference, and to mistakes that others planted."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -70,14 +71,16 @@ def test_a_flight_without_a_mistake_is_that_of_the_equation(equation, knobs):
 def test_each_mistake_is_told_from_its_equation_and_from_all_but_one_other(equation):
     asks = [knobs.ask(0) for knobs in THROWS]
     base, mistakes = MISTAKES[equation]
-    flights = {words: [flown(ask, change, base) for ask in asks] for words, change in {"none": {}, **mistakes}.items()}
+    flights = {
+        words: [flown(ask, change, base) for ask in asks] for words, change in {"none": {}, **dict(mistakes)}.items()
+    }
 
     def rooms(one, other):
         pairs = zip(asks, flights[one], flights[other], strict=True)
         return max(np.nanmax(np.abs(a - b)) / (FLOOR * abs(ask.scenario.omega0)) for ask, a, b in pairs)
 
-    assert {words: rooms(words, "none") > FAR for words in mistakes} == dict.fromkeys(mistakes, True)
-    alike = {words: [other for other in mistakes if not rooms(words, other) > 1.0] for words in mistakes}
+    assert {words: rooms(words, "none") > FAR for words in dict(mistakes)} == dict.fromkeys(dict(mistakes), True)
+    alike = {words: [other for other in dict(mistakes) if not rooms(words, other) > 1.0] for words in dict(mistakes)}
     assert {words: others for words, others in alike.items() if len(others) > 2} == {}
 
 
@@ -122,8 +125,8 @@ def test_a_speed_below_which_something_stops_is_told_to_a_digit(words):
     "words", [pytest.param(words, marks=pytest.mark.slow) if k % 4 else words for k, words in enumerate(FITTED)]
 )
 def test_a_factor_is_found_again(words):
-    equation = "free-flight" if "the tube counts" in words else "eq8"
-    assert words.format(0.83) in named(Likened(dict.fromkeys(FITTED[words], 0.83), equation))
+    equation = "free-flight" if "tube" in words and "J" not in words else "eq8"
+    assert words.format(0.83) in named(Likened(partial(FITTED[words], 0.83), equation))
 
 
 @pytest.mark.parametrize(
@@ -132,6 +135,14 @@ def test_a_factor_is_found_again(words):
         ("twentysecond", "magnus_cap_swallows", "a slice stays on the cap that it strikes"),
         ("ours", "NoReaction", "the tube does not feel the drag of the slices"),
         ("ours", "RestitutionLow", "an impact multiplies the speed by 0.9 e"),
+        ("ours", "DragFivePercent", "the drag counts 1.05 times on slices, and once on the tube"),
+        ("ours", "WrongEpsilon", "the bottle weighs 1.3 of M_b in r_CM alone"),
+        ("ours", "NoRecoil", "it answers nearly like a solver in which an impact does not move the tube"),
+        (
+            "second",
+            "only_base_kicks",
+            "on 1 of 4 throws it answers like a solver in which an impact on the cap does not",
+        ),
         ("twentythird", "taylor_thick_rest_layer", "rests as soon as its next bounce would be lower than about 0.0"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
@@ -139,11 +150,7 @@ def test_a_factor_is_found_again(words):
                 ("twentysecond", "magnus_drag_over_all_water", "alpha is divided by the mass of all the water"),
                 ("twentysecond", "newmark_drag_against_tube", "drag is taken against the tube instead of C_M"),
                 ("twentysecond", "newmark_no_parallel_axis", "M_b (L/2 - r_CM)^2 is left out of J"),
-                (
-                    "twentythird",
-                    "strang_resting_slices_counted_in_drag",
-                    "it answers nearly like a solver in which v_CM",
-                ),
+                ("twentythird", "strang_resting_slices_counted_in_drag", "v_CM takes the mean velocity of the flying"),
             )
         ),
     ],

@@ -4,10 +4,10 @@
     u     = reference v_CM - reaction (m / M_c) sum_free v_j
 
 with k = alpha / m, x the point from which slices are thrown outward, and M_c the mass of the tube with what rests in
-it. An impact changes the velocity of the tube by ``recoil`` times its impulse over M_b. The factors as they stand in
-``Mistake`` are Eq. 8 as it should be, with those of ``FREE`` free flight. Runge-Kutta steps of order 4; impacts and
-releases are located by bisection. omega is accurate to 1e-8 of omega_0 on the throws of ``mistakes``. It shares no
-code with ``ode_reference``.
+it. An impact changes the velocity of the tube by ``recoil`` times its impulse over M_b, and that of the other slices in
+the tube by ``felt`` times as much. The factors as they stand in ``Mistake`` are Eq. 8 as it should be, with those of
+``FREE`` free flight. Runge-Kutta steps of order 4; impacts and releases are located by bisection. omega is accurate to
+1e-8 of omega_0 on the throws of ``mistakes``. It shares no code with ``ode_reference``.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ FREE: Final[Mapping[str, float]] = {
     "reference": 0.0,
     "reaction": 1.0,
     "recoil": 1.0,
+    "felt_base": 1.0,
+    "felt_cap": 1.0,
 }
 """What free flight has otherwise than Eq. 8."""
 
@@ -59,6 +61,10 @@ class Mistake(NamedTuple):
     reaction: float = 0.0  # of the drag, on the body
     reaction_on_tube: float = 0.0  # ... on the tube alone
     recoil: float = 0.0
+    felt_base: float = 0.0  # of impacts on the base
+    felt_cap: float = 0.0
+    felt_by_struck: float = 0.0  # 1: also by the slices that strike, which turn at -e v otherwise
+    resting_in_impact: float = 1.0  # 0: slices at rest stay there, 2: ... and share the recoil of the tube
     e_base: float = 1.0
     e_cap: float = 1.0
     e_power: float = 1.0
@@ -68,6 +74,7 @@ class Mistake(NamedTuple):
     rests_if_pressed: float = 0.0  # a slice rests at its first impact if its end presses it
     push_weight: float = 1.0
     push_drag: float = 1.0
+    let_go_at_once: float = 0.0  # 1: whatever its push would be as a free slice
     let_go_base: float = 1.0
     let_go_cap: float = 1.0
     ends: float = 1.0  # of h/2N, by which the places end before the tube's ends
@@ -169,10 +176,12 @@ def _push(y, side, held, n, momentum, tube, q):
 
 @merged
 def _lets_go(y, i, held, n, momentum, tube, q):
-    """Return whether an end lets go of a slice; where counting it as free reverses its push, it stays."""
+    """Return whether an end lets go of a slice; it stays where its push would turn round if it were counted as free."""
     side = held[i]
     if not (q.let_go_base if side > 0 else q.let_go_cap) or _push(y, side, held, n, momentum, tube, q) >= 0.0:
         return False
+    if q.let_go_at_once:
+        return True
     held[i] = 0
     goes = _push(y, side, held, n, momentum, tube, q) < 0.0
     held[i] = side
@@ -206,14 +215,16 @@ def _react(y, held, contact, pressed, n, momentum, tube, q):
     The impulses that act are those of ``pressed``: with d_i = (1 + e) v_i and R = recoil / M_b the tube's velocity
     changes by R m sum d_i / (1 + R m sum 1), both sums over them, and d_i less that must point outward for each.
     """
-    given = q.recoil / tube.bottle
+    resting = 0
     for i in range(n):
         if held[i] != 0 and _lets_go(y, i, held, n, momentum, tube, q):
             held[i] = 0
         r, v = y[1 + i], y[1 + n + i]
         struck = 1 if r >= tube.high and v > 0.0 else -1 if r <= tube.low and v < 0.0 else 0
-        contact[i] = held[i] if held[i] != 0 else struck
+        resting += 1 if held[i] != 0 else 0
+        contact[i] = struck if held[i] == 0 else held[i] if q.resting_in_impact == 1.0 else 0
         pressed[i] = contact[i] != 0
+    given = q.recoil / (tube.bottle + (tube.m * resting if q.resting_in_impact == 2.0 else 0.0))
     moved = 0.0
     for _ in range(2 * n + 2):
         total, count, changes = 0.0, 0, False
@@ -229,10 +240,18 @@ def _react(y, held, contact, pressed, n, momentum, tube, q):
                 pressed[i] = presses
         if not changes:
             break
+    felt = 0.0
+    for i in range(n):
+        if pressed[i]:
+            v, side = y[1 + n + i], contact[i]
+            share = q.felt_base if side > 0 else q.felt_cap
+            felt += share * given * tube.m * ((1.0 + _e(v, side, tube, q)) * v - moved)
     scale, stopped, stops = tube.length * abs(tube.omega0), 0.0, 0
     for i in range(n):
         v, side = y[1 + n + i], contact[i]
-        after = -_e(v, side, tube, q) * v if pressed[i] else v - moved
+        if side == 0 and held[i] != 0:
+            continue
+        after = -_e(v, side, tube, q) * v + q.felt_by_struck * (moved - felt) if pressed[i] else v - felt
         if i != q.still:
             y[1 + n + i] = after
         if side == 0:

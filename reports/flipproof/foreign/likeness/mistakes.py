@@ -1,7 +1,8 @@
 """Known mistakes in Eq. 8 and in free flight, and which of them gives a solver's answers.
 
 A mistake is named if its flight is the solver's on every one of ``THROWS``, within the solver's own error, and that of
-its equation is not. The throws differ in slices, restitution, drag, weight and start, so that mistakes seldom agree.
+its equation is not; or, with words that say so, if it is nearly so, or on some of them. The throws differ in slices,
+restitution, drag, weight and start, so that mistakes seldom agree.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -49,11 +51,23 @@ FAR: Final = 10.0
 NEARER: Final = 20.0
 """How much nearer than its equation a mistake must be on throws that it does not explain, to be named as near."""
 
+SURELY: Final = 100.0
+"""Rooms by which the equation must be off on a throw that names a mistake without the others."""
+
+MAX_NAMED: Final = 2
+"""Mistakes named at most; one that does not lead to the answers on all throws is not named beside more than these."""
+
 Factors = Mapping[str, float]
 Change = Factors | Callable[[Scenario], Factors]
 """Factors and switches of a flight; a function gives them for a throw."""
 
-COMMON: Final[Mapping[str, Change]] = {
+
+def _felt(factor: float, by_struck: bool = False) -> Factors:
+    """Return what puts a factor before the recoil that slices feel, those that strike, too, or not."""
+    return {"felt_base": factor, "felt_cap": factor, "felt_by_struck": float(by_struck)}
+
+
+COMMON: Final[Mapping[str, Change | tuple[Change, ...]]] = {
     "drag is missing": {"drag": 0.0},
     "drag drives slices instead of slowing them": {"drag": -1.0},
     "alpha is divided by the mass of all the water instead of a slice's": lambda s: {"drag": 1.0 / s.n_slices},
@@ -99,7 +113,7 @@ COMMON: Final[Mapping[str, Change]] = {
 }
 """What is wrong -> what it changes; the words follow "it answers like a solver in which"."""
 
-OF_EQ8: Final[Mapping[str, Change]] = {
+OF_EQ8: Final[Mapping[str, Change | tuple[Change, ...]]] = {
     "drag is taken against the tube instead of C_M": {"reference": 0.0},
     "drag is taken against mean(v) instead of v_CM": lambda s: {"reference": s.total_mass / s.water_mass},
     "drag is taken against minus v_CM": {"reference": -1.0},
@@ -123,10 +137,16 @@ OF_EQ8: Final[Mapping[str, Change]] = {
 }
 """The same of Eq. 8 alone."""
 
-OF_FREE_FLIGHT: Final[Mapping[str, Change]] = {
+OF_FREE_FLIGHT: Final[Mapping[str, Change | tuple[Change, ...]]] = {
     "gravity pulls slices along the bottle, g cos(theta)": {"cosine": 1.0},
     "the tube does not feel the drag of the slices": {"reaction": 0.0},
     "the tube feels the drag of the slices in the wrong direction": {"reaction": -1.0},
+    "the tube feels the drag of one slice instead of all": lambda s: {"reaction": 1.0 / s.n_slices},
+    "drag drives slices instead of slowing them, yet the tube feels it rightly": {"drag": -1.0, "reaction": -1.0},
+    "the tube has the mass M_b and its centre at L/2 whatever rests in it": {
+        "thrown_from": MIDDLE,
+        "reaction_on_tube": 1.0,
+    },
     "the drag of the slices moves the tube without the slices that rest in it": {"reaction_on_tube": 1.0},
     "the drag of the slices moves the mass of bottle and water": lambda s: {
         "reaction": s.bottle.mass / s.total_mass,
@@ -141,15 +161,32 @@ OF_FREE_FLIGHT: Final[Mapping[str, Change]] = {
     "an impact moves the tube as if it had the mass of bottle and water": lambda s: {
         "recoil": s.bottle.mass / s.total_mass
     },
+    "the impulse of an impact changes the tube's velocity by P / (M_b + M_w) instead of P / M_b": (
+        lambda s: _felt(s.bottle.mass / s.total_mass),
+        lambda s: _felt(s.bottle.mass / s.total_mass, by_struck=True),
+    ),
+    "the impulse of an impact is that on a tube that cannot move": lambda s: _felt(1.0 + s.slice_mass / s.bottle.mass),
+    "an impact moves the tube in the wrong direction": (_felt(-1.0), _felt(-1.0, by_struck=True)),
+    "an impact on the base does not move the tube": {"felt_base": 0.0},
+    "an impact on the cap does not move the tube": {"felt_cap": 0.0},
+    "slices at rest take no part in an impact": {"resting_in_impact": 0.0},
+    "slices at rest move with the tube in an impact": {"resting_in_impact": 2.0},
     "a slice at rest is let go by a push without the drag on the tube": {"push_drag": 0.0},
 }
 """The same of free flight alone."""
 
-MISTAKES: Final[Mapping[str, tuple[Factors, Mapping[str, Change]]]] = {
-    "eq8": ({}, {**COMMON, **OF_EQ8}),
-    "free-flight": (FREE, {**COMMON, **OF_FREE_FLIGHT}),
+MISTAKES: Final[Mapping[str, tuple[Factors, tuple[tuple[str, Change], ...]]]] = {
+    equation: (
+        factors,
+        tuple(
+            (words, change)
+            for words, changes in {**COMMON, **mistakes}.items()
+            for change in (changes if isinstance(changes, tuple) else (changes,))
+        ),
+    )
+    for equation, factors, mistakes in (("eq8", {}, OF_EQ8), ("free-flight", FREE, OF_FREE_FLIGHT))
 }
-"""Equation -> the factors that make it, and the mistakes in it."""
+"""Equation -> the factors that make it, and the mistakes in it, some in two ways."""
 
 SLOW: Final[Mapping[str, tuple[str, str, str]]] = {
     "a slice rests as soon as it leaves an end slower than about {}": ("rest_speed", "L omega_0", "m/s"),
@@ -161,26 +198,41 @@ SLOW: Final[Mapping[str, tuple[str, str, str]]] = {
 LIMITS: Final = np.geomspace(1e-3, 0.5, 120)
 """Speeds and heights tried, in either unit."""
 
-FITTED: Final[Mapping[str, tuple[str, ...]]] = {
-    "the drag counts {:.3g} times": ("drag",),
-    "v_CM counts {:.3g} times in the drag": ("reference",),
-    "the weight counts {:.3g} times": ("cosine",),
-    "the drag on the tube counts {:.3g} times": ("reaction",),
-    "the recoil of the tube counts {:.3g} times": ("recoil",),
-    "the centrifugal term counts {:.3g} times": ("centrifugal",),
-    "the bottle weighs {:.3g} of M_b": ("bottle",),
-    "the bottle counts {:.3g} times in r_CM": ("tube_in_centre",),
-    "the water counts {:.3g} times in r_CM": ("water_in_centre",),
-    "the bottle's own M_b (R^2/2 + L^2/12) counts {:.3g} times in J": ("own_length", "own_radius"),
-    "M_b L^2/12 counts {:.3g} times in J": ("own_length",),
-    "M_b (L/2 - r_CM)^2 counts {:.3g} times in J": ("shifted",),
-    "the slices count {:.3g} times in J": ("water_in_inertia",),
-    "an impact multiplies the speed by {:.3g} e": ("e_base", "e_cap"),
-    "an impact on the base multiplies the speed by {:.3g} e": ("e_base",),
-    "an impact on the cap multiplies the speed by {:.3g} e": ("e_cap",),
-    "slices turn {:.3g} x h/2N before the tube's ends": ("ends",),
+
+def _alike(*fields: str) -> Callable[[float, Scenario], Factors]:
+    """Return what puts one factor before some fields."""
+    return lambda factor, _: dict.fromkeys(fields, factor)
+
+
+FITTED: Final[Mapping[str, Callable[[float, Scenario], Factors]]] = {
+    "the drag counts {:.3g} times": _alike("drag"),
+    "v_CM counts {:.3g} times in the drag": _alike("reference"),
+    "the weight counts {:.3g} times": _alike("cosine"),
+    "the drag counts {:.3g} times on slices, and once on the tube": lambda factor, _: {
+        "drag": factor,
+        "reaction": 1.0 / factor if factor else 0.0,
+    },
+    "the drag on the tube counts {:.3g} times": _alike("reaction"),
+    "the recoil of the tube counts {:.3g} times": _alike("recoil"),
+    "the tube's recoil counts {:.3g} times in the velocities of the other slices": _alike("felt_base", "felt_cap"),
+    "the centrifugal term counts {:.3g} times": _alike("centrifugal"),
+    "the bottle weighs {:.3g} of M_b": _alike("bottle"),
+    "the bottle weighs {:.3g} of M_b in r_CM alone": lambda factor, s: {
+        "tube_in_centre": factor * s.total_mass / (factor * s.bottle.mass + s.water_mass),
+        "water_in_centre": s.total_mass / (factor * s.bottle.mass + s.water_mass),
+    },
+    "the bottle counts {:.3g} times in r_CM": _alike("tube_in_centre"),
+    "the water counts {:.3g} times in r_CM": _alike("water_in_centre"),
+    "the bottle's own M_b (R^2/2 + L^2/12) counts {:.3g} times in J": _alike("own_length", "own_radius"),
+    "M_b L^2/12 counts {:.3g} times in J": _alike("own_length"),
+    "M_b (L/2 - r_CM)^2 counts {:.3g} times in J": _alike("shifted"),
+    "the slices count {:.3g} times in J": _alike("water_in_inertia"),
+    "an impact multiplies the speed by {:.3g} e": _alike("e_base", "e_cap"),
+    "an impact on the base multiplies the speed by {:.3g} e": _alike("e_base"),
+    "an impact on the cap multiplies the speed by {:.3g} e": _alike("e_cap"),
+    "slices turn {:.3g} x h/2N before the tube's ends": _alike("ends"),
 }
-"""What is wrong by a factor, the same on every throw -> what the factor stands before, where that acts at all."""
+"""What is wrong by a factor, the same on every throw -> what it changes, where that acts at all."""
 
 GRID: Final = np.concatenate([[-1.0, -0.5, 0.0], np.geomspace(0.1, 8.0, 40)])
 """Factors tried first."""
@@ -188,11 +240,14 @@ GRID: Final = np.concatenate([[-1.0, -0.5, 0.0], np.geomspace(0.1, 8.0, 40)])
 ZOOMS: Final = 6
 """Times that the interval about the best factor is divided into 14 parts."""
 
+HELPS: Final = 0.9
+"""Largest ratio of the mean logarithm of the rooms, with the best factor tried first and with 1, that is followed."""
+
 SPAN: Final = 1e-3
 """Fraction of a factor within which the first throw alone finds it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Flown:
     """omega of a solver on one throw, and its room, both fractions of omega_0, at the times at which it is clear."""
 
@@ -201,15 +256,29 @@ class _Flown:
     room: FloatArray
     equation: Factors
 
+    @cached_property
+    def right(self) -> FloatArray:
+        """Rooms by which the equation without a mistake is off at each time."""
+        return self.off({})
+
     def off(self, change: Change) -> FloatArray:
-        """Return by how many rooms the flight with a mistake is off at each time."""
+        """Return by how many rooms the flight with a mistake is off at each time; NaN from too many events on."""
         factors = change(self.ask.scenario) if callable(change) else change
         omega = fly(self.ask, Mistake(**{**self.equation, **factors})) / abs(self.ask.scenario.omega0)
-        return np.nan_to_num(np.abs(omega[: len(self.omega)] - self.omega) / self.room, nan=1e9)
+        return np.abs(omega[: len(self.omega)] - self.omega) / self.room
 
     def excess(self, change: Change) -> float:
-        """Return the largest number of rooms by which the flight with a mistake is off."""
-        return float(np.max(self.off(change), initial=0.0))
+        """Return the largest number of rooms by which the flight with a mistake is off, where it is flown.
+
+        Infinity if that is not long enough to tell it from the equation.
+        """
+        off = self.off(change)
+        told = _largest(self.right) <= FAR or _largest(self.right[~np.isnan(off)]) > FAR
+        return _largest(off) if told else np.inf
+
+
+def _largest(off: FloatArray) -> float:
+    return float(np.max(np.nan_to_num(off, nan=0.0), initial=0.0))
 
 
 def naming(traits: Traits) -> TextGenerator:
@@ -225,19 +294,35 @@ def naming(traits: Traits) -> TextGenerator:
         with suppress(ForeignError):
             answers = yield [replace(ask, effort=effort_of(traits, ask.scenario, level)) for level in levels]
             flown.append(_flown(traits, ask, answers, equation))
-    if len(flown) < 2 or not max(one.excess({}) for one in flown) > FAR:
+    if len(flown) < 2 or not max(_largest(one.right) for one in flown) > FAR:
         return ""
-    named = [words for words, change in mistakes.items() if _explains(flown, change)]
+    named = [words for words, change in mistakes if _explains(flown, change)]
+    near = [] if named else [(words, change) for words, change in mistakes if _nearly_explains(flown, change)]
+    # With a mistake it may matter whether a slice at rest is let go by its push at rest, or has to be pushed when free.
+    named = named or [words for words, change in near if _explains(flown, partial(_at_once, change))]
     named = named or [text for words, how in SLOW.items() if (text := _slow(flown, words, *how))]
     acts = Mistake(**equation)._asdict()
     named = named or [
         text
-        for words, fields in FITTED.items()
-        if all(acts[field] for field in fields) and (text := _fitted(flown, words, fields))
+        for words, how in FITTED.items()
+        if all(acts[field] for field in how(1.0, flown[0].ask.scenario)) and (text := _fitted(flown, words, how))
     ]
-    nearly = [] if named else [words for words, change in mistakes.items() if _nearly_explains(flown, change)]
-    answers_like = f"it answers {'nearly ' if nearly else ''}like a solver in which"
-    return f"{answers_like} {' or '.join((named or nearly)[:2])}" if named or nearly else ""
+    if named or near:
+        return _words(f"it answers {'' if named else 'nearly '}like", named or [words for words, _ in near])
+    alike = {
+        words: max(_alike_on(flown, change) for like, change in mistakes if like == words) for words, _ in mistakes
+    }
+    most = max(alike.values())
+    partly = [words for words, count in alike.items() if count == most > 0]
+    return _words(f"on {most} of {len(flown)} throws it answers like", partly) if 0 < len(partly) <= MAX_NAMED else ""
+
+
+def _words(how: str, named: Sequence[str]) -> str:
+    return f"{how} a solver in which {' or '.join(list(dict.fromkeys(named))[:MAX_NAMED])}"
+
+
+def _at_once(change: Change, throw: Scenario) -> Factors:
+    return {**(change(throw) if callable(change) else change), "let_go_at_once": 1.0}
 
 
 def _flown(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: Factors) -> _Flown:
@@ -255,9 +340,14 @@ def _explains(flown: Sequence[_Flown], change: Change) -> bool:
 
 def _nearly_explains(flown: Sequence[_Flown], change: Change) -> bool:
     """Return whether a mistake leads to the answers on a throw, and on the others is ``NEARER`` than without it."""
-    distances = [(one.excess(change), one.excess({})) for one in flown]
+    distances = [(one.excess(change), _largest(one.right)) for one in flown]
     exact = sum(distance <= 1.0 and without > FAR for distance, without in distances)
     return exact >= 1 and all(distance <= max(1.0, without / NEARER) for distance, without in distances)
+
+
+def _alike_on(flown: Sequence[_Flown], change: Change) -> int:
+    """Return on how many throws a mistake leads to the answers, of those that tell it from its equation for sure."""
+    return sum(one.excess(change) <= 1.0 and _largest(one.right) > SURELY for one in flown)
 
 
 def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> str:
@@ -277,29 +367,33 @@ def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> str:
     return ""
 
 
-def _fitted(flown: Sequence[_Flown], words: str, fields: Sequence[str]) -> str:
-    """Return with what factor before some fields a mistake leads to the answers on all throws; empty with none.
+def _fitted(flown: Sequence[_Flown], words: str, how: Callable[[float, Scenario], Factors]) -> str:
+    """Return with what factor a mistake leads to the answers on all throws; empty with none.
 
     It is searched on the first throw, which has few impacts, and narrowed down on all of them if one explains that.
     """
     factor = 1.0
     for some, grid in ((flown[:1], GRID), (flown, 1.0 + SPAN * np.linspace(-1.0, 1.0, 15))):
-        factor = _nearest(some, fields, factor * grid)
-        if not _explains(some, dict.fromkeys(fields, factor)):
+        factor = _nearest(some, how, factor * grid)
+        if not _explains(some, partial(how, factor)):
             return ""
     return words.format(factor)
 
 
-def _nearest(flown: Sequence[_Flown], fields: Sequence[str], grid: FloatArray) -> float:
+def _nearest(flown: Sequence[_Flown], how: Callable[[float, Scenario], Factors], grid: FloatArray) -> float:
     """Return the factor whose flights are nearest to the answers: the best of a grid, which is divided ``ZOOMS`` times.
 
     Late in a flight a factor must be right to many digits: the logarithm lets the beginning lead to them.
     """
-    for _ in range(ZOOMS):
+    for zoom in range(ZOOMS):
         distances = [
-            sum(float(np.mean(np.log1p(one.off(dict.fromkeys(fields, factor))))) for one in flown)
+            sum(float(np.mean(np.log1p(np.nan_to_num(one.off(partial(how, factor)), nan=1e9)))) for one in flown)
             for factor in grid.tolist()
         ]
         best = int(np.argmin(distances))
-        grid = np.linspace(grid[max(0, best - 1)], grid[min(len(grid) - 1, best + 1)], 15)
-    return float(grid[7])
+        low, high = grid[max(0, best - 1)], grid[min(len(grid) - 1, best + 1)]
+        without = sum(float(np.mean(np.log1p(one.right))) for one in flown)
+        if zoom == 0 and distances[best] > HELPS * without and not low <= 1.0 <= high:
+            break
+        grid = np.linspace(low, high, 15)
+    return float(grid[len(grid) // 2])
