@@ -259,11 +259,19 @@ def _advance_cause(intervals: Sequence[Interval]) -> str:
 
 
 def _angle_cause(intervals: Sequence[Interval]) -> str:
-    """Return by what multiple of the integral of omega theta advances, if it is constant and not 1."""
+    """Return by what multiple of the integral of omega theta advances, if it is constant and not 1.
+
+    If r advances by the same multiple of its way, the step itself is too long or too short.
+    """
     ratio = np.array([(i.theta[1] - i.theta[0]) / (i.expected["theta"] - i.theta[0]) for i in intervals])
     median = float(np.median(ratio))
     if abs(median - 1.0) < 0.003 or float(np.ptp(np.quantile(ratio, (0.1, 0.9)))) > 0.1 * abs(median - 1.0):
         return ""
+    calm = [i for i in intervals if not (i.hits or i.before.any() or i.after.any())]
+    ways = sum(float((i.r[1] - i.r[0]) @ (i.expected["r"] - i.r[0])) for i in calm)
+    squares = sum(float(np.sum((i.expected["r"] - i.r[0]) ** 2)) for i in calm)
+    if len(calm) > 12 and abs(ways - median * squares) < 0.3 * abs(median - 1.0) * squares:
+        return f"theta and r advance by {median:.4g} of each step: look at the weights of the step, or at its length"
     return f"theta advances by {median:.4g} of the integral of omega"
 
 

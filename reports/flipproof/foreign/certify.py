@@ -273,7 +273,9 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     if observation.holds:
         return result(verdict=WEAK if observation.weak else PASSED, observation=observation)
     if name in OF_MOTION and (named := _named(traits, recorder)):
-        observation = replace(observation, advice=named)
+        # What explains some throws alone stands beside the advice, what explains all in its place.
+        further = "" if named.startswith("it answers") or not observation.advice else f"; {observation.advice}"
+        observation = replace(observation, advice=f"{named}{further}")
     return result(
         verdict=FAILED if reason is None else EXPECTED,
         observation=observation,

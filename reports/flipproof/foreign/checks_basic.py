@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+import ode_reference
 from flipproof.foreign import elsewhere
 from flipproof.foreign.causes import parts_of_inertia, rms
 from flipproof.foreign.checking import (
@@ -25,7 +26,7 @@ from flipproof.foreign.checking import (
     shift,
     time_of_max,
 )
-from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
 from slicemodel import Scenario
@@ -96,6 +97,8 @@ def check_start(traits: Traits) -> CheckGenerator:
         (inside,) = yield [replace(ask, start=elsewhere.far_from_ends(throw))]
         if abs(inside.omega[0] / throw.omega0 - 1.0) <= bound:
             hint = "right from a start far from the ends: look at the places of the ends, h/2N and L - h/2N"
+        elif not hint and abs(answer.omega[0] / throw.omega0 + 1.0) > bound:  # the sign alone needs no other J
+            hint = "omega(0) is omega_0: in J_0 omega_0 / J, J_0 and J are to have one definition"
     return Observation(
         holds=errors[worst] <= bound,
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
@@ -379,7 +382,9 @@ def check_angle(traits: Traits) -> CheckGenerator:
     min_ratio = 8.0 if (traits.order or 0.0) >= 2.0 and sizes[-1] > bound else 3.0
     holds = sizes[0] <= bound or (_falls(sizes, min_ratio) and sizes[-1] <= 100 * bound)
     hint = "" if holds else _times_advice(answers[0]) or _jump_advice(asks[0].times, answers[0].omega / THROW.omega0)
-    if not (holds or hint):
+    turns = errors[0] / (2 * np.pi)
+    wrapped = not holds and turns.max() > 0.5 and np.all(np.abs(turns - np.round(turns)) < 0.01)
+    if not (holds or hint or wrapped):
         hint = _lag_advice(asks[0], answers[0]) or _stale_advice(answers[0])
     stops = holds and (slow_error > 100 * max(bound, sizes[0]) or slow.theta[-1] == slow.theta[-2])
     end_differs = abs(slow_end.theta[-1] - slow.theta[-1]) > 0.2 * abs(slow.theta[-1] - slow.theta[0])
@@ -406,6 +411,8 @@ def check_angle(traits: Traits) -> CheckGenerator:
         where=f"flight of {SLOW.duration:g} s" if stops else time_of_max(asks[0].times, errors[0]),
         advice=stall_advice or "fly to the last of ask.times, however late that is"
         if stops
+        else "theta is off by whole turns: do not wrap it"
+        if wrapped
         else f"{hint}theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a "
         "step with an impact; or the omega answered is not the one by which theta advances",
         facts={"angle": sizes},
@@ -417,10 +424,18 @@ def _stale_advice(answer: Answer) -> str:
     mean = (answer.omega[1:] + answer.omega[:-1]) / 2
     missing, slope = np.diff(answer.theta) / np.diff(answer.t) - mean, np.diff(answer.omega) / np.diff(answer.t)
     delay = float(np.sum(missing * slope) / max(float(np.sum(slope**2)), 1e-300))
-    if not rms(missing - delay * slope) < 0.3 * rms(missing):
-        return ""
-    side = "earlier" if delay > 0 else "later"
-    return f"omega is that of {abs(delay):.2g} s {side} than theta: answer both, and the inertia, of one instant; "
+    if rms(missing - delay * slope) < 0.3 * rms(missing):
+        late = ", or advance theta by omega of the middle of a step, not of its beginning"
+        side, or_else = ("earlier", "") if delay > 0 else ("later", late)
+        how = f"answer both, and the inertia, of one instant{or_else}; "
+        return f"omega is that of {abs(delay):.2g} s {side} than theta: {how}"
+    clear = np.abs(slope) > 0.1 * np.max(np.abs(slope), initial=0.0)
+    delays = missing[clear] / slope[clear]
+    if len(delays) > 12 and np.quantile(delays, 0.05) > -0.1 * np.quantile(delays, 0.95):
+        return (
+            f"omega is that of up to {np.quantile(delays, 0.95):.2g} s earlier than theta: answer both of one instant; "
+        )
+    return ""
 
 
 def _end_advice(ask: Ask, difference: float, theta: float) -> str:
@@ -653,12 +668,17 @@ def check_velocity(traits: Traits) -> CheckGenerator:
         + (
             "the difference falls with the step: look at how r and v are answered between two steps; "
             if sizes[-1] < 0.7 * sizes[0]
+            else "r jumps between times asked: look at how r and v are answered between two steps; "
+            if rms(np.diff(answers[0].r, n=2, axis=0)) > JUMP * rms(np.diff(answers[0].r, axis=0))
             else ""
         )
         + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )
 
+
+JUMP: Final = 0.1
+"""Ratio of the second to the first differences of r between close times above which r is not smooth."""
 
 LOCATED: Final = 10.0
 """A drift of up to this many times its bound is a weakness: slices that had passed an end are put back on it."""
@@ -674,11 +694,17 @@ def check_momentum(traits: Traits) -> CheckGenerator:
     sizes = [float(change.max()) for change in changes]
     bound = max(1e-6, 64 * traits.epsilon)  # what an engine achieves
     falls = _falls(sizes)
-    holds, advice = sizes[0] <= LOCATED * bound or falls, ""
+    holds, advice, located = sizes[0] <= LOCATED * bound or falls, "", ""
     if not holds:
         simpler = [ask_of(traits, throw) for throw in SIMPLER.values()]
-        drifts = [float(_drift(*pair).max()) for pair in zip(simpler, (yield simpler), strict=True)]
-        advice = _right_without(drifts, max(bound, 0.03 * sizes[0]))
+        simpler += [replace(ask_of(traits, replace(THROW, restitution=1.0)), start=elsewhere.far_from_ends(THROW))]
+        *drifts, restless = [float(_drift(*pair).max()) for pair in zip(simpler, (yield simpler), strict=True)]
+        room = max(bound, 0.03 * sizes[0])
+        advice = _right_without(drifts, room)
+        if answers[0].r is not None and restless <= room:
+            located = elsewhere.right_without("rests").removesuffix("; ")
+        if answers[0].r is not None and _omega_is_right(traits, asks[0], answers[0], room):
+            located = "omega is right, but not J: look at how r is made for the answer"
         if answers[0].r is None and changes[0][0] > bound:
             inertia = [answer.inertia for answer in (yield [replace(asks[0], start=start) for start in STARTS])]
             at_release = [values[0] for values in inertia if values is not None]
@@ -690,7 +716,8 @@ def check_momentum(traits: Traits) -> CheckGenerator:
         expected=f"J omega constant within {bound:.1g}, or a change that falls with refinement",
         observed=f"changed by {sizes[0]:.2g}{_refined_text(traits, sizes)}",
         where=time_of_max(asks[0].times, changes[0]),
-        advice=f"{advice}no torque acts about the centre of mass: omega = J_0 omega_0 / J, with J of the same instant, "
+        advice=located
+        or f"{advice}no torque acts about the centre of mass: omega = J_0 omega_0 / J, with J of the same instant, "
         "about the centre of mass, of slices and bottle",
         facts={"momentum": sizes},
     )
@@ -702,6 +729,15 @@ def _drift(ask: Ask, answer: Answer) -> FloatArray:
     inertia = answer.inertia if answer.r is None else moment_of_inertia(throw, answer.r)
     assert inertia is not None
     return np.asarray(np.abs(inertia * answer.omega / (moment_of_inertia(throw, ask.start) * throw.omega0) - 1.0))
+
+
+def _omega_is_right(traits: Traits, ask: Ask, answer: Answer, room: float) -> bool:
+    """Return whether omega is that of the reference within ``room``, a fraction of omega_0."""
+    try:
+        exact = ode_reference.solve(started(ask), switches_of(traits.equation or ""), answer.t)
+    except ValueError:
+        return False
+    return bool(np.max(np.abs(answer.omega - exact.omega)) <= room * abs(ask.scenario.omega0))
 
 
 SIMPLER: Final = {"weight": replace(THROW, gravity=0.0), "drag": replace(THROW, drag=0.0), "impacts": SMOOTH}

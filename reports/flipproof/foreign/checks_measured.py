@@ -284,7 +284,8 @@ def check_order_across(traits: Traits) -> CheckGenerator:
         observed=f"{order:.2f}, {errors[-1]:.2g} of omega_0 at the finest{limited}",
         where=f"{throws[0].n_slices} to {throws[-1].n_slices} slices, 0.3 s with impacts on both ends, steps of 5 ms "
         "and its halves",
-        advice="rebounds answered at the next step give order 1; an order near 0 means that refinement does not help",
+        advice="rebounds answered at the next step give order 1; an order near 0 means that refinement does not help: "
+        "look at how exactly the instant of an impact is found, and at what is done there",
         facts={"order_across_impacts": order},
     )
 
@@ -361,6 +362,7 @@ PIECES: Final = (
     replace(elsewhere.RESTLESS, slices=5),
     replace(elsewhere.WHOLE, gravity=0.0, damping=0.0, angle=5.0),
     elsewhere.HELD,
+    replace(elsewhere.STICKY, slices=5, start="stacked on the cap"),
 )
 """Throws with and without weight, drag, and rests on one or both ends, of an even and an odd number of slices."""
 

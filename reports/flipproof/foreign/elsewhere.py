@@ -106,6 +106,8 @@ class Knobs:
             start = np.roll(rng.permutation(start), 1) if self.slices > 2 else start[::-1].copy()
         elif self.start == "scattered" and self.slices == 1:
             start = np.array([throw.r_min + 0.3 * (throw.r_max - throw.r_min)])  # no force acts on it in the middle
+        elif self.start == "stacked on the cap":
+            start = throw.r_min + throw.r_max - start
         elif self.start == "in the middle":
             start = far_from_ends(throw)
         elif self.start != "stacked":
@@ -693,7 +695,7 @@ def bisected(
             knob_advice = "" if name == "slices" and result.impacts_passed else WORDS[name][1]
             return (
                 f"{ice}right at {knob_text(PAPER, name)}, wrong at {knob_text(knobs, name)}: {_wrong_text(result)}",
-                together or _impact_advice(result),
+                together or ("" if name == "restitution" else _impact_advice(result)),
                 fields or without or knob_advice,
             )
     reverted = yield from compare_all([replace(knobs, **{name: getattr(PAPER, name)}) for name in names])
@@ -739,7 +741,8 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "weight": "the weight term, g cos(theta) along the bottle",
     "drag": "the drag, alpha v / m, and against what v is measured",
     "impacts": "impacts: restitution, recoil, their places, which slices take part",
-    "rests": "rests: when a slice begins to rest on base or cap, when it is let go, and its part in what others do",
+    "rests": "rests: when a slice begins to rest on base or cap, when it is let go, and its part in the motion "
+    "and the impacts of others",
 }
 """What to look at if an answer is right without weight, drag, impacts or rests, in the order they are tested."""
 

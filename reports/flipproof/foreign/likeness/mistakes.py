@@ -52,7 +52,10 @@ NEARER: Final = 20.0
 """How much nearer than its equation a mistake must be on throws that it does not explain, to be named as near."""
 
 SURELY: Final = 100.0
-"""Rooms by which the equation must be off on a throw that names a mistake without the others."""
+"""Rooms by which the equation must be off on a throw that names a mistake without the others.
+
+How much nearer than its equation a mistake must be to be named as near where it is right on no throw.
+"""
 
 MAX_NAMED: Final = 2
 """Mistakes named at most; one that does not lead to the answers on all throws is not named beside more than these."""
@@ -166,12 +169,15 @@ OF_FREE_FLIGHT: Final[Mapping[str, Change | tuple[Change, ...]]] = {
         lambda s: _felt(s.bottle.mass / s.total_mass, by_struck=True),
     ),
     "the impulse of an impact is that on a tube that cannot move": lambda s: _felt(1.0 + s.slice_mass / s.bottle.mass),
+    "an impact moves the tube by its speed instead of (1 + e) times its speed": lambda s: _felt(
+        1.0 / (1.0 + s.restitution)
+    ),
     "an impact moves the tube in the wrong direction": (_felt(-1.0), _felt(-1.0, by_struck=True)),
     "an impact on the base does not move the tube": {"felt_base": 0.0},
     "an impact on the cap does not move the tube": {"felt_cap": 0.0},
     "slices at rest take no part in an impact": {"resting_in_impact": 0.0},
     "slices at rest move with the tube in an impact": {"resting_in_impact": 2.0},
-    "a slice at rest is let go by a push without the drag on the tube": {"push_drag": 0.0},
+    "a slice at rest is let go by a push with too little drag on the tube, or from another centre": {"push_drag": 0.0},
 }
 """The same of free flight alone."""
 
@@ -339,10 +345,14 @@ def _explains(flown: Sequence[_Flown], change: Change) -> bool:
 
 
 def _nearly_explains(flown: Sequence[_Flown], change: Change) -> bool:
-    """Return whether a mistake leads to the answers on a throw, and on the others is ``NEARER`` than without it."""
+    """Return whether a mistake is ``NEARER`` than its equation on every throw that tells, and right on one.
+
+    ``SURELY`` times nearer on all of them will do, too.
+    """
     distances = [(one.excess(change), _largest(one.right)) for one in flown]
-    exact = sum(distance <= 1.0 and without > FAR for distance, without in distances)
-    return exact >= 1 and all(distance <= max(1.0, without / NEARER) for distance, without in distances)
+    told = [(distance, without) for distance, without in distances if without > FAR]
+    right = any(distance <= 1.0 for distance, _ in told) or all(d <= without / SURELY for d, without in told)
+    return right and all(distance <= max(1.0, without / NEARER) for distance, without in distances)
 
 
 def _alike_on(flown: Sequence[_Flown], change: Change) -> int:
