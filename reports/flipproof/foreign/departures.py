@@ -47,7 +47,7 @@ EXACT: Final = 1e-7
 OVERLOOKED: Final = 1e-3
 """Departures of most impacts at steps so long if each is located, and of one that is overlooked.
 
-Right solvers whose median is below the first leave the second at one impact at the most.
+Right solvers whose median is below ten times the first leave the second at one impact at the most.
 """
 
 FALLS: Final = 0.4
@@ -118,6 +118,9 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "impacts on rests": "the part of slices at rest in the impact of another",
 }
 """What to look at, by what happens between two outputs."""
+
+LOW: Final = 0.03
+"""Speed of an impact that may be overlooked in a long step [L omega_0]."""
 
 FEW: Final = 3
 """Fewest departing intervals that are reported: rounding may move one impact to the other side of an output."""
@@ -275,8 +278,12 @@ def _same_share(lone: Sequence[Interval], delays: FloatArray) -> bool:
 
 
 def _overlooked(intervals: Sequence[Interval]) -> str:
-    """Return at how many impacts a solver departs that locates most of them exactly."""
-    sizes = np.array([interval.size for interval in intervals if interval.hits])
+    """Return at how many impacts a solver departs that locates most of them exactly.
+
+    The low bounces of a slice that comes to rest may be lost in a long step.
+    """
+    struck = [i for i in intervals if i.hits and max(i.speeds) > LOW * i.throw.bottle.length * abs(i.throw.omega0)]
+    sizes = np.array([interval.size for interval in struck])
     count = int(np.sum(sizes > OVERLOOKED))
     if count < FEW or np.median(sizes) > EXACT:
         return ""
