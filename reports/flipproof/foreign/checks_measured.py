@@ -362,7 +362,7 @@ PIECES: Final = (
     replace(elsewhere.RESTLESS, slices=5),
     replace(elsewhere.WHOLE, gravity=0.0, damping=0.0, angle=5.0),
     elsewhere.HELD,
-    replace(elsewhere.STICKY, slices=5, start="stacked on the cap"),
+    replace(elsewhere.WHOLE, start="stacked on the cap"),
 )
 """Throws with and without weight, drag, and rests on one or both ends, of an even and an odd number of slices."""
 
