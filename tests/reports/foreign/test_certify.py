@@ -770,7 +770,7 @@ def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, 
     ],
 )
 def test_one_throw_tells_where_the_mistake_is(mistake, piece, words):
-    """What ``piecewise`` says of five throws, from the one of them that shows the mistake."""
+    """What ``piecewise`` says of six throws, from the one of them that shows the mistake."""
     solver = next(mistakes[mistake] for mistakes in LISTS.values() if mistake in mistakes).solver()
     runner = InProcess(solver, mistake)
     equation = name_of(switches_of(runner.traits.equation))
