@@ -15,11 +15,11 @@ of 70, 56 of 60, 35 of 40, 47 of 50, 45 of 50, 47 of 50, 41 of 50, three times 4
 an earlier author had planted, too, three that change no digit of forty random throws, and one solver with its mistakes,
 because it does not end on a throw of the suite. After each list checks or advice were changed, after the last seven
 advice only, but for two rules, on late impacts, and on what a solver of order 1 gets wrong, which is asked again at
-finer steps, and one throw, which lets slices go from the cap; after the last five the lines of six to seventeen
-mistakes each were changed and not judged again. In ``twentyfourth`` all solvers are of free flight. The author of
-``seventeenth`` also wrote the six solvers that he and the next author changed. A right solver whose impacts wait for
-its grid was accused, because three levels of refinement agreed by chance, until the check confirmed at finer steps what
-it finds.
+finer steps, one throw, which lets slices go from the cap, and impacts overlooked in long steps, of which low ones no
+longer count; after the last five the lines of six to seventeen mistakes each were changed and not judged again. In
+``twentyfourth`` all solvers are of free flight. The author of ``seventeenth`` also wrote the six solvers that he and
+the next author changed. A right solver whose impacts wait for its grid was accused, because three levels of refinement
+agreed by chance, until the check confirmed at finer steps what it finds.
 """
 
 from __future__ import annotations

@@ -97,6 +97,7 @@ def time_cause(intervals: Sequence[Interval]) -> str:
         shifted = i.expected["v"][flies] * delay
         if flies.any():
             agree.append(rms((i.expected["r"] - i.r[1])[flies] - shifted) < 0.1 * rms(shifted))
+    # Not in all intervals: a slice that strikes within one is off by more than its speed times the delay.
     if 2 * len(agree) < len(intervals) or np.mean(agree) < 0.4 or rms(delays) < 1e-7 * intervals[0].throw.duration:
         return ""
     if np.median(np.abs(delays)) < 0.3 * rms(delays):

@@ -17,7 +17,7 @@ import ode_reference
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.checking import drive
-from flipproof.foreign.checks_measured import PIECES
+from flipproof.foreign.checks_measured import CROWDED, PIECES
 from flipproof.foreign.contract import IMPACT, Ask, ForeignError, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.elsewhere import (
@@ -748,6 +748,14 @@ def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, 
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
     assert advice in result.line
+
+
+def test_low_bounces_that_a_long_step_loses_are_no_mistake():
+    """Beside throws on whose impacts it is exact, a right solver departs at four low bounces of one."""
+    runner = InProcess(LISTS["right"]["rootfinder"].solver(), "rootfinder")
+    exact = replace(PIECES[1], start="stacked on the cap")
+    asks = [knobs.ask(0) for knobs in (*PIECES[:5], exact)]
+    assert drive(departing(runner.traits, "free-flight", asks, [CROWDED.ask(0)]), runner) == ("", "")
 
 
 @pytest.mark.parametrize(
