@@ -190,7 +190,7 @@ class _Recorder(Runner):
         self.answers: dict[tuple[Any, ...], Answer] = {}
         self.unanswered: Ask | None = None
         self.explained = False
-        self.named: str | None = None
+        self.named: tuple[str, bool] | None = None
         self.domain: dict[str, tuple[float, float]] = {}
 
     def __call__(self, ask: Ask) -> Answer:
@@ -272,10 +272,11 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
         return result(verdict=FAILED, observation=observation, reason=f"declared as a failure ({reason}), but holds")
     if observation.holds:
         return result(verdict=WEAK if observation.weak else PASSED, observation=observation)
-    if name in OF_MOTION and (named := _named(traits, recorder)):
+    if name in OF_MOTION:
+        named, explained = _named(traits, recorder)
         # What explains some throws alone stands beside the advice, what explains all in its place.
-        further = "" if named.startswith("it answers") or not observation.advice else f"; {observation.advice}"
-        observation = replace(observation, advice=f"{named}{further}")
+        beside = [] if explained else [observation.advice]
+        observation = replace(observation, advice="; ".join(filter(None, [named, *beside])))
     return result(
         verdict=FAILED if reason is None else EXPECTED,
         observation=observation,
@@ -283,10 +284,10 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     )
 
 
-def _named(traits: Traits, recorder: _Recorder) -> str:
-    """Return which known mistake gives a solver's answers, a sentence; empty if none does. It is sought once."""
+def _named(traits: Traits, recorder: _Recorder) -> tuple[str, bool]:
+    """Return what ``naming`` says of a solver. It is sought once."""
     if recorder.named is None:
-        recorder.named = ""
+        recorder.named = "", False
         with suppress(WaitingError):  # nobody is asked to write more answers for an advice
             recorder.named = drive(naming(traits), recorder)
     return recorder.named

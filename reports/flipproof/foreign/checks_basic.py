@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-import ode_reference
 from flipproof.foreign import elsewhere
 from flipproof.foreign.causes import parts_of_inertia, rms
 from flipproof.foreign.checking import (
@@ -425,10 +424,10 @@ def _stale_advice(answer: Answer) -> str:
     missing, slope = np.diff(answer.theta) / np.diff(answer.t) - mean, np.diff(answer.omega) / np.diff(answer.t)
     delay = float(np.sum(missing * slope) / max(float(np.sum(slope**2)), 1e-300))
     if rms(missing - delay * slope) < 0.3 * rms(missing):
-        late = ", or advance theta by omega of the middle of a step, not of its beginning"
-        side, or_else = ("earlier", "") if delay > 0 else ("later", late)
-        how = f"answer both, and the inertia, of one instant{or_else}; "
-        return f"omega is that of {abs(delay):.2g} s {side} than theta: {how}"
+        side, advice = "earlier", "answer both, and the inertia, of one instant"
+        if delay < 0.0:
+            side, advice = "later", f"{advice}, or advance theta by omega of the middle of a step, not of its beginning"
+        return f"omega is that of {abs(delay):.2g} s {side} than theta: {advice}; "
     clear = np.abs(slope) > 0.1 * np.max(np.abs(slope), initial=0.0)
     delays = missing[clear] / slope[clear]
     if len(delays) > 12 and np.quantile(delays, 0.05) > -0.1 * np.quantile(delays, 0.95):
@@ -734,7 +733,7 @@ def _drift(ask: Ask, answer: Answer) -> FloatArray:
 def _omega_is_right(traits: Traits, ask: Ask, answer: Answer, room: float) -> bool:
     """Return whether omega is that of the reference within ``room``, a fraction of omega_0."""
     try:
-        exact = ode_reference.solve(started(ask), switches_of(traits.equation or ""), answer.t)
+        exact = curve(traits.equation or "", started(ask), answer.t)
     except ValueError:
         return False
     return bool(np.max(np.abs(answer.omega - exact.omega)) <= room * abs(ask.scenario.omega0))

@@ -53,17 +53,17 @@ class Thrown:
 
 def named(solver):
     runner = InProcess(solver, "x")
-    return drive(naming(runner.traits), runner).removeprefix("it answers like a solver in which ")
+    return drive(naming(runner.traits), runner)[0].removeprefix("it answers like a solver in which ")
 
 
 @pytest.mark.arithmetic
-@pytest.mark.parametrize("equation", MISTAKES)
+@pytest.mark.parametrize(("equation", "bound"), [("eq8", 1e-8), ("free-flight", 5e-8)])
 @pytest.mark.parametrize("knobs", THROWS)
-def test_a_flight_without_a_mistake_is_that_of_the_equation(equation, knobs):
+def test_a_flight_without_a_mistake_is_that_of_the_equation(equation, bound, knobs):
     ask = knobs.ask(0)
     exact = ode_reference.solve(started(ask), equation, ask.times)
     omega = fly(ask, Mistake(**MISTAKES[equation][0]))
-    assert np.max(np.abs(omega - exact.omega)) < 1e-7 * abs(ask.scenario.omega0)
+    assert np.max(np.abs(omega - exact.omega)) < bound * abs(ask.scenario.omega0)
     assert len(exact.impacts.time) >= 5
 
 
@@ -71,17 +71,21 @@ def test_a_flight_without_a_mistake_is_that_of_the_equation(equation, knobs):
 def test_each_mistake_is_told_from_its_equation_and_from_all_but_one_other(equation):
     asks = [knobs.ask(0) for knobs in THROWS]
     base, mistakes = MISTAKES[equation]
-    flights = {
-        words: [flown(ask, change, base) for ask in asks] for words, change in {"none": {}, **dict(mistakes)}.items()
-    }
+    ways = [("none", {}), *mistakes]  # of one mistake there may be two
+    flights = [[flown(ask, change, base) for ask in asks] for _, change in ways]
 
     def rooms(one, other):
-        pairs = zip(asks, flights[one], flights[other], strict=True)
+        pairs = zip(asks, one, other, strict=True)
         return max(np.nanmax(np.abs(a - b)) / (FLOOR * abs(ask.scenario.omega0)) for ask, a, b in pairs)
 
-    assert {words: rooms(words, "none") > FAR for words in dict(mistakes)} == dict.fromkeys(dict(mistakes), True)
-    alike = {words: [other for other in dict(mistakes) if not rooms(words, other) > 1.0] for words in dict(mistakes)}
-    assert {words: others for words, others in alike.items() if len(others) > 2} == {}
+    assert [
+        words for (words, _), flight in zip(ways[1:], flights[1:], strict=True) if not rooms(flight, flights[0]) > FAR
+    ] == []
+    alike = [
+        (words, {other for (other, _), their in zip(ways, flights, strict=True) if not rooms(flight, their) > 1.0})
+        for (words, _), flight in zip(ways, flights, strict=True)
+    ]
+    assert [(words, others) for words, others in alike if len(others) > 2] == []
 
 
 @pytest.mark.parametrize(
@@ -156,7 +160,9 @@ def test_a_factor_is_found_again(words):
     ],
 )
 def test_what_others_planted_is_named(group, mistake, words):
-    assert words in named(OURS[mistake]() if group == "ours" else patches(group)[mistake].solver())
+    said = named(OURS[mistake]() if group == "ours" else patches(group)[mistake].solver())
+    assert words in said
+    assert ("it answers nearly" in words) == ("it answers nearly" in said)
 
 
 def test_the_line_of_a_check_of_motion_names_the_mistake():

@@ -7,7 +7,8 @@ with k = alpha / m, x the point from which slices are thrown outward, and M_c th
 it. An impact changes the velocity of the tube by ``recoil`` times its impulse over M_b, and that of the other slices in
 the tube by ``felt`` times as much. The factors as they stand in ``Mistake`` are Eq. 8 as it should be, with those of
 ``FREE`` free flight. Runge-Kutta steps of order 4; impacts and releases are located by bisection. omega is accurate to
-1e-8 of omega_0 on the throws of ``mistakes``. It shares no code with ``ode_reference``.
+1e-8 of omega_0 in Eq. 8 and to 5e-8 in free flight, on the throws of ``mistakes``. It shares no code with
+``ode_reference``.
 """
 
 from __future__ import annotations

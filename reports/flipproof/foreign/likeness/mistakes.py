@@ -7,7 +7,7 @@ restitution, drag, weight and start, so that mistakes seldom agree.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -17,7 +17,7 @@ import numpy as np
 
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
-from flipproof.foreign.elsewhere import WHOLE, TextGenerator
+from flipproof.foreign.elsewhere import WHOLE
 from flipproof.foreign.likeness.flight import CAP, CENTRE, FREE, MEAN, MIDDLE, Mistake, fly
 from flipproof.foreign.place import name_of, switches_of
 from slicemodel import Scenario
@@ -205,38 +205,38 @@ LIMITS: Final = np.geomspace(1e-3, 0.5, 120)
 """Speeds and heights tried, in either unit."""
 
 
-def _alike(*fields: str) -> Callable[[float, Scenario], Factors]:
+def _before(*fields: str) -> Callable[[float, Scenario], Factors]:
     """Return what puts one factor before some fields."""
     return lambda factor, _: dict.fromkeys(fields, factor)
 
 
 FITTED: Final[Mapping[str, Callable[[float, Scenario], Factors]]] = {
-    "the drag counts {:.3g} times": _alike("drag"),
-    "v_CM counts {:.3g} times in the drag": _alike("reference"),
-    "the weight counts {:.3g} times": _alike("cosine"),
+    "the drag counts {:.3g} times": _before("drag"),
+    "v_CM counts {:.3g} times in the drag": _before("reference"),
+    "the weight counts {:.3g} times": _before("cosine"),
     "the drag counts {:.3g} times on slices, and once on the tube": lambda factor, _: {
         "drag": factor,
         "reaction": 1.0 / factor if factor else 0.0,
     },
-    "the drag on the tube counts {:.3g} times": _alike("reaction"),
-    "the recoil of the tube counts {:.3g} times": _alike("recoil"),
-    "the tube's recoil counts {:.3g} times in the velocities of the other slices": _alike("felt_base", "felt_cap"),
-    "the centrifugal term counts {:.3g} times": _alike("centrifugal"),
-    "the bottle weighs {:.3g} of M_b": _alike("bottle"),
+    "the drag on the tube counts {:.3g} times": _before("reaction"),
+    "the recoil of the tube counts {:.3g} times": _before("recoil"),
+    "the tube's recoil counts {:.3g} times in the velocities of the other slices": _before("felt_base", "felt_cap"),
+    "the centrifugal term counts {:.3g} times": _before("centrifugal"),
+    "the bottle weighs {:.3g} of M_b": _before("bottle"),
     "the bottle weighs {:.3g} of M_b in r_CM alone": lambda factor, s: {
         "tube_in_centre": factor * s.total_mass / (factor * s.bottle.mass + s.water_mass),
         "water_in_centre": s.total_mass / (factor * s.bottle.mass + s.water_mass),
     },
-    "the bottle counts {:.3g} times in r_CM": _alike("tube_in_centre"),
-    "the water counts {:.3g} times in r_CM": _alike("water_in_centre"),
-    "the bottle's own M_b (R^2/2 + L^2/12) counts {:.3g} times in J": _alike("own_length", "own_radius"),
-    "M_b L^2/12 counts {:.3g} times in J": _alike("own_length"),
-    "M_b (L/2 - r_CM)^2 counts {:.3g} times in J": _alike("shifted"),
-    "the slices count {:.3g} times in J": _alike("water_in_inertia"),
-    "an impact multiplies the speed by {:.3g} e": _alike("e_base", "e_cap"),
-    "an impact on the base multiplies the speed by {:.3g} e": _alike("e_base"),
-    "an impact on the cap multiplies the speed by {:.3g} e": _alike("e_cap"),
-    "slices turn {:.3g} x h/2N before the tube's ends": _alike("ends"),
+    "the bottle counts {:.3g} times in r_CM": _before("tube_in_centre"),
+    "the water counts {:.3g} times in r_CM": _before("water_in_centre"),
+    "the bottle's own M_b (R^2/2 + L^2/12) counts {:.3g} times in J": _before("own_length", "own_radius"),
+    "M_b L^2/12 counts {:.3g} times in J": _before("own_length"),
+    "M_b (L/2 - r_CM)^2 counts {:.3g} times in J": _before("shifted"),
+    "the slices count {:.3g} times in J": _before("water_in_inertia"),
+    "an impact multiplies the speed by {:.3g} e": _before("e_base", "e_cap"),
+    "an impact on the base multiplies the speed by {:.3g} e": _before("e_base"),
+    "an impact on the cap multiplies the speed by {:.3g} e": _before("e_cap"),
+    "slices turn {:.3g} x h/2N before the tube's ends": _before("ends"),
 }
 """What is wrong by a factor, the same on every throw -> what it changes, where that acts at all."""
 
@@ -287,12 +287,12 @@ def _largest(off: FloatArray) -> float:
     return float(np.max(np.nan_to_num(off, nan=0.0), initial=0.0))
 
 
-def naming(traits: Traits) -> TextGenerator:
-    """Return "it answers like a solver in which" and the mistake that gives its answers, or two; empty if none does."""
+def naming(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, bool]]:
+    """Return which mistake gives the answers, or two, and whether on all throws; "" and False if none does."""
     try:
         equation, mistakes = MISTAKES[name_of(switches_of(traits.equation or ""))]
     except (ValueError, KeyError):
-        return ""
+        return "", False
     flown = []
     for knobs in THROWS:
         ask = knobs.ask(0)
@@ -300,10 +300,12 @@ def naming(traits: Traits) -> TextGenerator:
         with suppress(ForeignError):
             answers = yield [replace(ask, effort=effort_of(traits, ask.scenario, level)) for level in levels]
             flown.append(_flown(traits, ask, answers, equation))
-    if len(flown) < 2 or not max(_largest(one.right) for one in flown) > FAR:
-        return ""
-    named = [words for words, change in mistakes if _explains(flown, change)]
-    near = [] if named else [(words, change) for words, change in mistakes if _nearly_explains(flown, change)]
+    without = [_largest(one.right) for one in flown]
+    if len(flown) < 2 or not max(without) > FAR:
+        return "", False
+    distances = [(words, change, [one.excess(change) for one in flown]) for words, change in mistakes]
+    named = [words for words, _, each in distances if max(each) <= 1.0]
+    near = [] if named else [(words, change) for words, change, each in distances if _is_near(each, without)]
     # With a mistake it may matter whether a slice at rest is let go by its push at rest, or has to be pushed when free.
     named = named or [words for words, change in near if _explains(flown, partial(_at_once, change))]
     named = named or [text for words, how in SLOW.items() if (text := _slow(flown, words, *how))]
@@ -314,13 +316,15 @@ def naming(traits: Traits) -> TextGenerator:
         if all(acts[field] for field in how(1.0, flown[0].ask.scenario)) and (text := _fitted(flown, words, how))
     ]
     if named or near:
-        return _words(f"it answers {'' if named else 'nearly '}like", named or [words for words, _ in near])
-    alike = {
-        words: max(_alike_on(flown, change) for like, change in mistakes if like == words) for words, _ in mistakes
-    }
-    most = max(alike.values())
-    partly = [words for words, count in alike.items() if count == most > 0]
-    return _words(f"on {most} of {len(flown)} throws it answers like", partly) if 0 < len(partly) <= MAX_NAMED else ""
+        return _words(f"it answers {'' if named else 'nearly '}like", named or [words for words, _ in near]), True
+    counts = [
+        (words, sum(d <= 1.0 and eq > SURELY for d, eq in zip(each, without, strict=True)))
+        for words, _, each in distances
+    ]
+    most = max(count for _, count in counts)
+    partly = dict.fromkeys(words for words, count in counts if count == most > 0)
+    told = 0 < len(partly) <= MAX_NAMED
+    return _words(f"on {most} of {len(flown)} throws it answers like", list(partly)) if told else "", False
 
 
 def _words(how: str, named: Sequence[str]) -> str:
@@ -344,20 +348,15 @@ def _explains(flown: Sequence[_Flown], change: Change) -> bool:
     return all(one.excess(change) <= 1.0 for one in flown)
 
 
-def _nearly_explains(flown: Sequence[_Flown], change: Change) -> bool:
+def _is_near(distances: Sequence[float], without: Sequence[float]) -> bool:
     """Return whether a mistake is ``NEARER`` than its equation on every throw that tells, and right on one.
 
-    ``SURELY`` times nearer on all of them will do, too.
+    ``SURELY`` times nearer on all of them will do, too. Both by throw, in rooms.
     """
-    distances = [(one.excess(change), _largest(one.right)) for one in flown]
-    told = [(distance, without) for distance, without in distances if without > FAR]
-    right = any(distance <= 1.0 for distance, _ in told) or all(d <= without / SURELY for d, without in told)
-    return right and all(distance <= max(1.0, without / NEARER) for distance, without in distances)
-
-
-def _alike_on(flown: Sequence[_Flown], change: Change) -> int:
-    """Return on how many throws a mistake leads to the answers, of those that tell it from its equation for sure."""
-    return sum(one.excess(change) <= 1.0 and _largest(one.right) > SURELY for one in flown)
+    pairs = list(zip(distances, without, strict=True))
+    told = [(distance, equation) for distance, equation in pairs if equation > FAR]
+    right = any(distance <= 1.0 for distance, _ in told) or all(d <= equation / SURELY for d, equation in told)
+    return right and all(distance <= max(1.0, equation / NEARER) for distance, equation in pairs)
 
 
 def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> str:
@@ -396,14 +395,15 @@ def _nearest(flown: Sequence[_Flown], how: Callable[[float, Scenario], Factors],
     Late in a flight a factor must be right to many digits: the logarithm lets the beginning lead to them.
     """
     for zoom in range(ZOOMS):
-        distances = [
-            sum(float(np.mean(np.log1p(np.nan_to_num(one.off(partial(how, factor)), nan=1e9)))) for one in flown)
-            for factor in grid.tolist()
-        ]
+        distances = [_mean_log(flown, partial(how, factor)) for factor in grid.tolist()]
         best = int(np.argmin(distances))
         low, high = grid[max(0, best - 1)], grid[min(len(grid) - 1, best + 1)]
-        without = sum(float(np.mean(np.log1p(one.right))) for one in flown)
-        if zoom == 0 and distances[best] > HELPS * without and not low <= 1.0 <= high:
+        if zoom == 0 and not low <= 1.0 <= high and distances[best] > HELPS * _mean_log(flown, {}):
             break
         grid = np.linspace(low, high, 15)
     return float(grid[len(grid) // 2])
+
+
+def _mean_log(flown: Sequence[_Flown], change: Change) -> float:
+    """Return the mean logarithm of the rooms by which the flights with a mistake are off, summed over throws."""
+    return sum(float(np.mean(np.log1p(np.nan_to_num(one.off(change), nan=1e9)))) for one in flown)
