@@ -57,14 +57,16 @@ def named(solver):
 
 
 @pytest.mark.arithmetic
-@pytest.mark.parametrize(("equation", "bound"), [("eq8", 1e-8), ("free-flight", 5e-8)])
+@pytest.mark.parametrize("equation", MISTAKES)
 @pytest.mark.parametrize("knobs", THROWS)
-def test_a_flight_without_a_mistake_is_that_of_the_equation(equation, bound, knobs):
+def test_a_flight_without_a_mistake_is_that_of_the_equation(equation, knobs):
+    # Which speeds are too slow to bounce counts where slices at rest change the mass that forces move.
+    bound = 1e-5 if equation == "accelerating-origin" else 5e-8
     ask = knobs.ask(0)
     exact = ode_reference.solve(started(ask), equation, ask.times)
     omega = fly(ask, Mistake(**MISTAKES[equation][0]))
     assert np.max(np.abs(omega - exact.omega)) < bound * abs(ask.scenario.omega0)
-    assert len(exact.impacts.time) >= 5
+    assert len(exact.impacts.time) >= (1 if equation == "signs-limit" else 5)
 
 
 @pytest.mark.parametrize("equation", MISTAKES)
@@ -111,7 +113,7 @@ def test_eq8_itself_and_what_no_mistake_explains_have_no_name():
     assert named(Thrown(lambda _: {})) == ""
     assert named(Thrown(lambda s: {"drag": 0.5 * s.drag, "gravity": 0.7 * s.gravity})) == ""
     unknown = Thrown(lambda s: {"drag": 0.5 * s.drag})
-    unknown.equation = "accelerating-origin"
+    unknown.equation = "switches:100001"
     assert named(unknown) == ""
 
 
@@ -129,7 +131,7 @@ def test_a_speed_below_which_something_stops_is_told_to_a_digit(words):
     "words", [pytest.param(words, marks=pytest.mark.slow) if k % 4 else words for k, words in enumerate(FITTED)]
 )
 def test_a_factor_is_found_again(words):
-    equation = "free-flight" if "tube" in words and "J" not in words else "eq8"
+    equation = "free-flight" if "tube" in words and "J" not in words else "signs-limit" if "gamma" in words else "eq8"
     assert words.format(0.83) in named(Likened(partial(FITTED[words], 0.83), equation))
 
 

@@ -1,1 +1,1 @@
-"""Which known mistake in Eq. 8 or free flight gives a solver's answers: every one of a table is flown and compared."""
+"""Which known mistake in its equation gives a solver's answers: every one of a table is flown and compared."""

@@ -1,13 +1,15 @@
-"""Eq. 8 or free flight with a mistake in it: one flight whose every term has a factor.
+"""An equation of the ladder with a mistake in it: one flight whose every term has a factor.
 
-    r_i'' = centrifugal omega^2 (r_i - x) + g (cosine cos(theta) + sine sin(theta)) - drag k (v_i - u)
+    r_i'' = centrifugal (omega^2 - K) (r_i - x) + (1 - K / omega^2) g (cosine cos(theta) + sine sin(theta))
+            - drag k (v_i - u)
+    K     = negative_spring (k / 2)^2
     u     = reference v_CM - reaction (m / M_c) sum_free v_j
 
 with k = alpha / m, x the point from which slices are thrown outward, and M_c the mass of the tube with what rests in
 it. An impact changes the velocity of the tube by ``recoil`` times its impulse over M_b, and that of the other slices in
-the tube by ``felt`` times as much. The factors as they stand in ``Mistake`` are Eq. 8 as it should be, with those of
-``FREE`` free flight. Runge-Kutta steps of order 4; impacts and releases are located by bisection. omega is accurate to
-1e-8 of omega_0 in Eq. 8 and to 5e-8 in free flight, on the throws of ``mistakes``. It shares no code with
+the tube by ``felt`` times as much. The factors as they stand in ``Mistake`` are Eq. 8 as it should be, those of
+``factors_of`` another equation. Runge-Kutta steps of order 4; impacts and releases are located by bisection. omega is
+accurate to 5e-8 of omega_0 on the throws of ``mistakes``, where no factor is wrong. It shares no code with
 ``ode_reference``.
 """
 
@@ -20,27 +22,46 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from flipproof.foreign.contract import Ask
+from ode_reference.switches import Switches
 from slicemodel.compiled import kept_on_disk, merged
 from slicemodel.trajectory import FloatArray
 
 CENTRE, MEAN, MIDDLE, CAP, BODY = 0.0, 1.0, 2.0, 3.0, 4.0
 """Points from which slices may be thrown: r_CM, mean(r), L/2, the cap, the centre of the tube with what rests in it."""
 
-FREE: Final[Mapping[str, float]] = {
-    "thrown_from": BODY,
-    "cosine": 0.0,
-    "reference": 0.0,
-    "reaction": 1.0,
-    "recoil": 1.0,
-    "felt_base": 1.0,
-    "felt_cap": 1.0,
-}
-"""What free flight has otherwise than Eq. 8."""
+RECOIL: Final[Mapping[str, float]] = {"recoil": 1.0, "felt_base": 1.0, "felt_cap": 1.0}
+"""An impact that moves the tube."""
+
+
+def factors_of(switches: Switches) -> Mapping[str, float]:
+    """Return what an equation of the ladder has otherwise than Eq. 8.
+
+    With ``origin`` it is that of free bodies: it must have ``signs``, ``roots`` and ``weightless``, too.
+    """
+    return {
+        "negative_spring": float(not switches.roots),
+        "drag": float(switches.signs),
+        "cosine": float(not switches.weightless),
+        "reference": float(switches.drag_on_centre and not switches.origin),
+        "reaction": float(switches.origin),
+        "thrown_from": BODY if switches.origin else CENTRE,
+        **(RECOIL if switches.recoil else {}),
+    }
+
+
+STEPS: Final = 1000
+MAX_EVENTS: Final = 2000
+"""Steps of a flight without impacts, and impacts and releases after which it ends."""
+
+HALVINGS: Final = 26
+"""Of the step in which an impact is located: omega at the end moves by less than 1e-9 of omega_0."""
 
 
 class Mistake(NamedTuple):
     """The factors and switches of a flight; all are numbers, so that the compiled loop is one."""
 
+    alpha: float = 1.0  # before k
+    negative_spring: float = 0.0
     centrifugal: float = 1.0
     thrown_from: float = 0.0
     spin_kept: float = 0.0  # omega_0 stands for omega in the centrifugal term
@@ -111,7 +132,7 @@ def _point(which, centre, mean, length, body):
 
 @merged
 def _whole(r, v, held, momentum, theta, tube, q):
-    """Return omega, the spin that throws slices and from where, the weight, and the velocity that drag is against."""
+    """Return omega, what throws slices and from where, the weight, and the velocity that drag is against."""
     n = len(r)
     total, squares, flow, all_r, flying, resting = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):
@@ -133,24 +154,26 @@ def _whole(r, v, held, momentum, theta, tube, q):
     inertia += q.shifted * tube.bottle * (tube.length / 2 - centre) ** 2
     omega = momentum / inertia
     angle = tube.theta0 if q.angle_kept == 1.0 else theta - tube.theta0 if q.angle_kept == 2.0 else theta
-    weight = tube.g * (q.cosine * math.cos(angle) + q.sine * math.sin(angle))
+    negative = q.negative_spring * (tube.k / 2) ** 2
+    spin = tube.omega0 if q.spin_kept else omega
+    weight = (1.0 - negative / (spin * spin)) * tube.g * (q.cosine * math.cos(angle) + q.sine * math.sin(angle))
     moved = tube.m * flow / (tube.bottle + tube.m * (flying if q.flying_alone == 1.0 else n))
     against = q.reference * moved * (n / max(flying, 1.0) if q.flying_alone == 2.0 else 1.0)
     against -= q.reaction * tube.m * flow / (tube.bottle if q.reaction_on_tube else body_mass)
     x = _point(q.thrown_from, centre, mean, tube.length, body)
-    return omega, tube.omega0 if q.spin_kept else omega, x, weight, against
+    return omega, q.centrifugal * (spin * spin - negative), x, weight, against
 
 
 @merged
 def _slope(y, held, n, momentum, tube, q, dy):
     """Write the rate of the state (theta, r, v)."""
     r, v = y[1 : n + 1], y[n + 1 :]
-    omega, spin, x, weight, against = _whole(r, v, held, momentum, y[0], tube, q)
+    omega, square, x, weight, against = _whole(r, v, held, momentum, y[0], tube, q)
     dy[0] = omega
     for i in range(n):
         moves = held[i] == 0 and i != q.still
         dy[1 + i] = v[i] if moves else 0.0
-        push = q.centrifugal * spin * spin * (r[i] - x) + weight - q.drag * tube.k * (v[i] - against)
+        push = square * (r[i] - x) + weight - q.drag * tube.k * (v[i] - against)
         dy[1 + n + i] = push if moves else 0.0
 
 
@@ -169,10 +192,9 @@ def _advance(y, h, held, n, momentum, tube, q, slopes, middle, new):
 @merged
 def _push(y, side, held, n, momentum, tube, q):
     """Return the force a mass outward on a slice at rest on an end."""
-    _, spin, x, weight, against = _whole(y[1 : n + 1], y[n + 1 :], held, momentum, y[0], tube, q)
+    _, square, x, weight, against = _whole(y[1 : n + 1], y[n + 1 :], held, momentum, y[0], tube, q)
     end = tube.high if side > 0 else tube.low
-    thrown = q.centrifugal * spin * spin * (end - x)
-    return side * (thrown + q.push_weight * weight + q.push_drag * q.drag * tube.k * against)
+    return side * (square * (end - x) + q.push_weight * weight + q.push_drag * q.drag * tube.k * against)
 
 
 @merged
@@ -301,7 +323,7 @@ def _fly(times, start, step, tube, q, max_events):
                 if events > max_events:
                     return omega
                 low, high = 0.0, h
-                for _ in range(50):
+                for _ in range(HALVINGS):
                     h = (low + high) / 2
                     _advance(y, h, held, n, momentum, tube, q, slopes, middle, new)
                     if _happens(new, held, n, momentum, tube, q):
@@ -317,11 +339,6 @@ def _fly(times, start, step, tube, q, max_events):
     return omega
 
 
-STEPS: Final = 1000
-MAX_EVENTS: Final = 2000
-"""Steps of a flight without impacts, and impacts and releases after which it ends."""
-
-
 def fly(ask: Ask, mistake: Mistake) -> FloatArray:
     """Return omega at the times of an ask, shape (P,) [rad/s], with a mistake; NaN from too many events on."""
     s, bottle = ask.scenario, ask.scenario.bottle
@@ -335,7 +352,7 @@ def fly(ask: Ask, mistake: Mistake) -> FloatArray:
         own_radius=bottle.radius**2 / 2,
         low=inset,
         high=bottle.length - inset,
-        k=s.drag / m,
+        k=mistake.alpha * s.drag / m,
         e=s.restitution,
         g=s.gravity,
         theta0=s.theta0,

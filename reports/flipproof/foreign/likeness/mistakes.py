@@ -1,4 +1,4 @@
-"""Known mistakes in Eq. 8 and in free flight, and which of them gives a solver's answers.
+"""Known mistakes in the equations of the ladder, and which of them gives a solver's answers.
 
 A mistake is named if its flight is the solver's on every one of ``THROWS``, within the solver's own error, and that of
 its equation is not; or, with words that say so, if it is nearly so, or on some of them. The throws differ in slices,
@@ -14,12 +14,15 @@ from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.elsewhere import WHOLE
-from flipproof.foreign.likeness.flight import CAP, CENTRE, FREE, MEAN, MIDDLE, Mistake, fly
+from flipproof.foreign.likeness.flight import CAP, CENTRE, MEAN, MIDDLE, RECOIL, Mistake, factors_of, fly
 from flipproof.foreign.place import name_of, switches_of
+from ode_reference.models import MODELS
+from ode_reference.switches import Switches
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -65,16 +68,23 @@ Change = Factors | Callable[[Scenario], Factors]
 """Factors and switches of a flight; a function gives them for a throw."""
 
 
+Changes = Mapping[str, Change | tuple[Change, ...]]
+"""What is wrong -> what it changes; the words follow "it answers like a solver in which"."""
+
+
+def _as_full(s: Scenario) -> Factors:
+    """Return what puts the mass of the full bottle into r_CM."""
+    return dict.fromkeys(("tube_in_centre", "water_in_centre"), s.total_mass / (s.bottle.mass + s.bottle.capacity))
+
+
 def _felt(factor: float, by_struck: bool = False) -> Factors:
     """Return what puts a factor before the recoil that slices feel, those that strike, too, or not."""
     return {"felt_base": factor, "felt_cap": factor, "felt_by_struck": float(by_struck)}
 
 
-COMMON: Final[Mapping[str, Change | tuple[Change, ...]]] = {
-    "drag is missing": {"drag": 0.0},
-    "drag drives slices instead of slowing them": {"drag": -1.0},
-    "alpha is divided by the mass of all the water instead of a slice's": lambda s: {"drag": 1.0 / s.n_slices},
-    "alpha is not divided by the mass of a slice": lambda s: {"drag": s.slice_mass},
+COMMON: Final[Changes] = {
+    "alpha is divided by the mass of all the water instead of a slice's": lambda s: {"alpha": 1.0 / s.n_slices},
+    "alpha is not divided by the mass of a slice": lambda s: {"alpha": s.slice_mass},
     "a slice weighs M_w / (N + 1)": lambda s: {"slice_mass": s.n_slices / (s.n_slices + 1)},
     "a slice weighs M_w / (N - 1)": lambda s: {"slice_mass": s.n_slices / (s.n_slices - 1)},
     "the centrifugal term takes omega_0 for omega": {"spin_kept": 1.0},
@@ -106,42 +116,69 @@ COMMON: Final[Mapping[str, Change | tuple[Change, ...]]] = {
     "impacts on the base are elastic": lambda s: {"e_base": 1.0 / s.restitution},
     "impacts on the cap are elastic": lambda s: {"e_cap": 1.0 / s.restitution},
     "a slice rests at its first impact if its end presses it": {"rests_if_pressed": 1.0},
-    "a slice at rest is never let go": {"let_go_base": 0.0, "let_go_cap": 0.0},
-    "a slice at rest on the cap is never let go": {"let_go_cap": 0.0},
     "slices turn at 0 and L instead of h/2N before": {"ends": 0.0},
     "slices turn h/N before the tube's ends instead of h/2N": {"ends": 2.0},
     "slices turn where those of a half-full bottle do": lambda s: {"ends": 0.5 / s.fill_fraction},
     "slice 0 never moves": {"still": 0.0},
     "the last slice never moves": lambda s: {"still": s.n_slices - 1.0},
 }
-"""What is wrong -> what it changes; the words follow "it answers like a solver in which"."""
+"""In every equation."""
 
-OF_EQ8: Final[Mapping[str, Change | tuple[Change, ...]]] = {
-    "drag is taken against the tube instead of C_M": {"reference": 0.0},
-    "drag is taken against mean(v) instead of v_CM": lambda s: {"reference": s.total_mass / s.water_mass},
-    "drag is taken against minus v_CM": {"reference": -1.0},
-    "v_CM leaves out the mass of slices at rest": {"flying_alone": 1.0},
-    "v_CM takes the mean velocity of the flying slices for that of all": {"flying_alone": 2.0},
+OF_WEIGHT: Final[Changes] = {
     "the weight is missing": {"cosine": 0.0},
     "the weight has the wrong sign": {"cosine": -1.0},
     "the weight goes with sin(theta)": {"cosine": 0.0, "sine": 1.0},
     "the weight goes with -sin(theta)": {"cosine": 0.0, "sine": -1.0},
     "the weight keeps the angle of release": {"angle_kept": 1.0},
     "the weight takes the angle turned since release for theta": {"angle_kept": 2.0},
+    "a slice at rest is never let go": {"let_go_base": 0.0, "let_go_cap": 0.0},
+    "a slice at rest on the cap is never let go": {"let_go_cap": 0.0},
+    "a slice at rest on the base is never let go": {"let_go_base": 0.0},
+    "a slice at rest is let go by a push without its weight": {"push_weight": 0.0},
+}
+WITHOUT_WEIGHT: Final[Changes] = {"gravity pulls slices along the bottle, g cos(theta)": {"cosine": 1.0}}
+
+OF_DAMPING: Final[Changes] = {
+    "drag is missing": {"drag": 0.0},
+    "drag drives slices instead of slowing them": {"drag": -1.0},
+}
+WITHOUT_DAMPING: Final[Changes] = {
+    "drag slows the slices, (alpha/m) r_i'": {"drag": 1.0},
+    "drag drives the slices, (alpha/m) r_i'": {"drag": -1.0},
+}
+
+OF_GAMMA: Final[Changes] = {
+    "omega^2 stands for omega^2 - gamma^2": {"negative_spring": 0.0},
+    "omega^2 + gamma^2 stands for omega^2 - gamma^2": {"negative_spring": -1.0},
+    "gamma is alpha / m instead of alpha / 2m": {"alpha": 2.0},
+}
+
+AGAINST_CENTRE: Final[Changes] = {
+    "drag is taken against the tube instead of C_M": {"reference": 0.0},
+    "drag is taken against mean(v) instead of v_CM": lambda s: {"reference": s.total_mass / s.water_mass},
+    "drag is taken against minus v_CM": {"reference": -1.0},
+    "v_CM leaves out the mass of slices at rest": {"flying_alone": 1.0},
+    "v_CM takes the mean velocity of the flying slices for that of all": {"flying_alone": 2.0},
+    "the mass in r_CM and v_CM is that of the full bottle": lambda s: {
+        **_as_full(s),
+        "reference": s.total_mass / (s.bottle.mass + s.bottle.capacity),
+    },
+}
+OF_WEIGHT_AND_CENTRE: Final[Changes] = {
+    "a slice at rest is let go by a push without drag, alpha v_CM / m": {"push_drag": 0.0},
+}
+AGAINST_TUBE: Final[Changes] = {
+    "drag is taken against C_M instead of the tube": {"reference": 1.0},
+    "drag is taken against mean(v) instead of the tube": lambda s: {"reference": s.total_mass / s.water_mass},
+    "the mass in r_CM is that of the full bottle": lambda s: _as_full(s),
+}
+
+FROM_CENTRE: Final[Changes] = {
     "slices are thrown away from mean(r) instead of r_CM": {"thrown_from": MEAN},
     "slices are thrown away from L/2 instead of r_CM": {"thrown_from": MIDDLE},
     "slices are thrown away from the cap instead of r_CM": {"thrown_from": CAP},
-    "the mass in r_CM and v_CM is that of the full bottle": lambda s: dict.fromkeys(
-        ("tube_in_centre", "water_in_centre", "reference"), s.total_mass / (s.bottle.mass + s.bottle.capacity)
-    ),
-    "a slice at rest on the base is never let go": {"let_go_base": 0.0},
-    "a slice at rest is let go by a push without its weight": {"push_weight": 0.0},
-    "a slice at rest is let go by a push without drag, alpha v_CM / m": {"push_drag": 0.0},
 }
-"""The same of Eq. 8 alone."""
-
-OF_FREE_FLIGHT: Final[Mapping[str, Change | tuple[Change, ...]]] = {
-    "gravity pulls slices along the bottle, g cos(theta)": {"cosine": 1.0},
+FROM_BODY: Final[Changes] = {
     "the tube does not feel the drag of the slices": {"reaction": 0.0},
     "the tube feels the drag of the slices in the wrong direction": {"reaction": -1.0},
     "the tube feels the drag of one slice instead of all": lambda s: {"reaction": 1.0 / s.n_slices},
@@ -160,6 +197,11 @@ OF_FREE_FLIGHT: Final[Mapping[str, Change | tuple[Change, ...]]] = {
     "slices are thrown away from L/2 also while slices rest": {"thrown_from": MIDDLE},
     "slices are thrown away from mean(r)": {"thrown_from": MEAN},
     "slices are thrown away from the cap": {"thrown_from": CAP},
+    "a slice at rest is never let go": {"let_go_base": 0.0, "let_go_cap": 0.0},
+    "a slice at rest is let go by a push with too little drag on the tube, or from another centre": {"push_drag": 0.0},
+}
+
+OF_RECOIL: Final[Changes] = {
     "an impact does not move the tube": {"recoil": 0.0},
     "an impact moves the tube as if it had the mass of bottle and water": lambda s: {
         "recoil": s.bottle.mass / s.total_mass
@@ -175,24 +217,41 @@ OF_FREE_FLIGHT: Final[Mapping[str, Change | tuple[Change, ...]]] = {
     "an impact moves the tube in the wrong direction": (_felt(-1.0), _felt(-1.0, by_struck=True)),
     "an impact on the base does not move the tube": {"felt_base": 0.0},
     "an impact on the cap does not move the tube": {"felt_cap": 0.0},
+    "a slice at rest on the cap is never let go": {"let_go_cap": 0.0},
     "slices at rest take no part in an impact": {"resting_in_impact": 0.0},
     "slices at rest move with the tube in an impact": {"resting_in_impact": 2.0},
-    "a slice at rest is let go by a push with too little drag on the tube, or from another centre": {"push_drag": 0.0},
 }
-"""The same of free flight alone."""
+WITHOUT_RECOIL: Final[Changes] = {"an impact moves the tube": RECOIL}
+
+
+def _known(switches: Switches) -> tuple[tuple[str, Change], ...]:
+    """Return the mistakes that are known in an equation, some in two ways."""
+    if switches.origin:
+        forces = FROM_BODY
+    elif switches.drag_on_centre:
+        forces = {**FROM_CENTRE, **AGAINST_CENTRE, **({} if switches.weightless else OF_WEIGHT_AND_CENTRE)}
+    else:
+        forces = {**FROM_CENTRE, **(AGAINST_TUBE if switches.signs else {})}
+    groups: tuple[Changes, ...] = (
+        COMMON,
+        OF_DAMPING if switches.signs else WITHOUT_DAMPING,
+        WITHOUT_WEIGHT if switches.weightless else OF_WEIGHT,
+        {} if switches.roots else OF_GAMMA,
+        forces,
+        OF_RECOIL if switches.recoil else WITHOUT_RECOIL,
+    )
+    return tuple(
+        (words, change)
+        for group in groups
+        for words, changes in group.items()
+        for change in (changes if isinstance(changes, tuple) else (changes,))
+    )
+
 
 MISTAKES: Final[Mapping[str, tuple[Factors, tuple[tuple[str, Change], ...]]]] = {
-    equation: (
-        factors,
-        tuple(
-            (words, change)
-            for words, changes in {**COMMON, **mistakes}.items()
-            for change in (changes if isinstance(changes, tuple) else (changes,))
-        ),
-    )
-    for equation, factors, mistakes in (("eq8", {}, OF_EQ8), ("free-flight", FREE, OF_FREE_FLIGHT))
+    name: (factors_of(model.switches), _known(model.switches)) for name, model in MODELS.items()
 }
-"""Equation -> the factors that make it, and the mistakes in it, some in two ways."""
+"""Equation -> the factors that make it, and the mistakes in it."""
 
 SLOW: Final[Mapping[str, tuple[str, str, str]]] = {
     "a slice rests as soon as it leaves an end slower than about {}": ("rest_speed", "L omega_0", "m/s"),
@@ -219,6 +278,7 @@ FITTED: Final[Mapping[str, Callable[[float, Scenario], Factors]]] = {
         "reaction": 1.0 / factor if factor else 0.0,
     },
     "the drag on the tube counts {:.3g} times": _before("reaction"),
+    "gamma counts {:.3g} times": lambda factor, _: {"alpha": factor, "negative_spring": 1.0},
     "the recoil of the tube counts {:.3g} times": _before("recoil"),
     "the tube's recoil counts {:.3g} times in the velocities of the other slices": _before("felt_base", "felt_cap"),
     "the centrifugal term counts {:.3g} times": _before("centrifugal"),
@@ -243,8 +303,8 @@ FITTED: Final[Mapping[str, Callable[[float, Scenario], Factors]]] = {
 GRID: Final = np.concatenate([[-1.0, -0.5, 0.0], np.geomspace(0.1, 8.0, 40)])
 """Factors tried first."""
 
-ZOOMS: Final = 6
-"""Times that the interval about the best factor is divided into 14 parts."""
+LOCATED: Final = 1e-6
+"""Fraction of the interval about the best factor within which the nearest is found."""
 
 HELPS: Final = 0.9
 """Largest ratio of the mean logarithm of the rooms, with the best factor tried first and with 1, that is followed."""
@@ -381,27 +441,33 @@ def _fitted(flown: Sequence[_Flown], words: str, how: Callable[[float, Scenario]
 
     It is searched on the first throw, which has few impacts, and narrowed down on all of them if one explains that.
     """
-    factor = 1.0
-    for some, grid in ((flown[:1], GRID), (flown, 1.0 + SPAN * np.linspace(-1.0, 1.0, 15))):
-        factor = _nearest(some, how, factor * grid)
-        if not _explains(some, partial(how, factor)):
-            return ""
-    return words.format(factor)
+    factor = _nearest(flown[:1], how, GRID)
+    if not _explains(flown[:1], partial(how, factor)) or not _helps(flown, partial(how, factor)):
+        return ""
+    factor = _nearest(flown, how, factor * (1.0 + SPAN * np.linspace(-1.0, 1.0, 15)))
+    return words.format(factor) if _explains(flown, partial(how, factor)) else ""
 
 
 def _nearest(flown: Sequence[_Flown], how: Callable[[float, Scenario], Factors], grid: FloatArray) -> float:
-    """Return the factor whose flights are nearest to the answers: the best of a grid, which is divided ``ZOOMS`` times.
+    """Return the factor whose flights are nearest to the answers: the best of a grid, and then between its neighbours.
 
     Late in a flight a factor must be right to many digits: the logarithm lets the beginning lead to them.
     """
-    for zoom in range(ZOOMS):
-        distances = [_mean_log(flown, partial(how, factor)) for factor in grid.tolist()]
-        best = int(np.argmin(distances))
-        low, high = grid[max(0, best - 1)], grid[min(len(grid) - 1, best + 1)]
-        if zoom == 0 and not low <= 1.0 <= high and distances[best] > HELPS * _mean_log(flown, {}):
-            break
-        grid = np.linspace(low, high, 15)
-    return float(grid[len(grid) // 2])
+
+    def distance(factor: float) -> float:
+        return _mean_log(flown, partial(how, factor))
+
+    best = int(np.argmin([distance(factor) for factor in grid.tolist()]))
+    low, high = sorted((grid[max(0, best - 1)], grid[min(len(grid) - 1, best + 1)]))  # falling about a negative factor
+    if not (low <= 1.0 <= high or _helps(flown, partial(how, grid[best]))):
+        return float(grid[best])
+    nearest = minimize_scalar(distance, bounds=(low, high), method="bounded", options={"xatol": LOCATED * (high - low)})
+    return float(nearest.x)
+
+
+def _helps(flown: Sequence[_Flown], change: Change) -> bool:
+    """Return whether a mistake brings the flights nearer to the answers, so that it is worth while to follow it."""
+    return _mean_log(flown, change) <= HELPS * _mean_log(flown, {})
 
 
 def _mean_log(flown: Sequence[_Flown], change: Change) -> float:
