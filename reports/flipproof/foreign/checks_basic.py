@@ -496,12 +496,12 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     bound = max(2e-5, 64 * traits.epsilon)  # six printed digits are right
     if (hits := answer.impacts) is not None and len(hits):
         error = np.abs(hits.speed_after - THROW.restitution * hits.speed_before) * (hits.speed_after > 0)
-        error /= max(float(np.max(hits.speed_before)), 1e-300)
+        error /= max(float(np.max((hits.speed_before, hits.speed_after))), 1e-300)
         if not error.max() <= 0.02:  # they may be read off two steps
             return Observation(
                 holds=False,
                 expected="speed_after = e speed_before of each of the impacts, or 0",
-                observed=f"off by {error.max():.2g} of the largest speed_before",
+                observed=f"off by {error.max():.2g} of the largest speed",
                 where=time_of_max(hits.time, error),
                 advice="speeds of an impact are those in the bottle, before it and after it: look at how impacts are "
                 "answered",

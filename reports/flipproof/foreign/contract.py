@@ -205,7 +205,8 @@ class Answer:
 
     ``t`` [s], ``theta`` [rad], ``omega`` [rad/s], ``r_cm`` [m], ``inertia`` [kg m^2] have shape (P,), ``r`` [m] and
     ``v`` [m/s] (P, N). theta goes on beyond a turn, unwrapped; v is measured in the bottle, from cap to base. What the
-    solver did not give is None; r_cm and inertia follow from r by their definitions.
+    solver did not give is None; r_cm and inertia follow from r by their definitions. The speeds of ``impacts`` have lost
+    the sign that they may have been given with.
     """
 
     t: FloatArray
@@ -335,7 +336,8 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
             f"impacts.slice{_first_index(broken)} = {arrays['slice'][broken][0]:g} is not a whole number in "
             f"[0, {n_slices - 1}]"
         )
-    return Impacts(**arrays)  # type: ignore[arg-type]
+    speeds = {name: np.abs(arrays[name]) for name in ("speed_before", "speed_after")}  # also from velocities
+    return Impacts(**arrays | speeds)  # type: ignore[arg-type]
 
 
 def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Trajectory:

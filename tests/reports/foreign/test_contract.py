@@ -102,6 +102,8 @@ def test_impacts_come_as_rows_columns_or_mappings():
     for form in forms:
         (impact,) = answer_of(ASK, CURVE | {"impacts": form}).impacts
         assert (impact.end, impact.speed_after) == ("cap", 0.5)
+    (impact,) = answer_of(ASK, CURVE | {"impacts": [(0.1, 0, -1, -1.0, 0.5)]}).impacts  # velocities
+    assert (impact.speed_before, impact.speed_after) == (1.0, 0.5)
     assert len(answer_of(ASK, CURVE | {"impacts": []}).impacts) == 0
 
 
