@@ -194,7 +194,10 @@ def _restitution_cause(intervals: Sequence[Interval]) -> str:
         return "the slice that strikes leaves with another speed"
     wrong = [e for e in narrow if abs(np.median(measured[e]) - e) > max(0.003 * e, 2.0 * float(np.ptp(ends[e])))]
     if not wrong:
-        return "look at how the time of an impact is found: the slice that strikes leaves with the right e"
+        return (
+            "look at how the time of an impact is found, and where it is used: the slice that strikes leaves with the "
+            "right e"
+        )
     texts = []
     for e in wrong:
         median = float(np.median(measured[e]))

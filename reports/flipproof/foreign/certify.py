@@ -39,6 +39,7 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
         "inputs": checks_basic.check_inputs,
         "refinement": checks_measured.check_refinement,
         "ice": checks_basic.check_ice,
+        "published-vectors": checks_basic.check_vectors,
         "definitions": checks_basic.check_definitions,
         "velocity": checks_basic.check_velocity,
         "piecewise": checks_measured.check_piecewise,
@@ -54,7 +55,6 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
         "order-across-impacts": checks_measured.check_order_across,
         "precision-floor": checks_measured.check_floor,
         "elsewhere": elsewhere.check_elsewhere,
-        "published-vectors": checks_basic.check_vectors,
     }
 )
 """Every check by name, in the order in which they run: a failure cannot cause those before it.
@@ -207,7 +207,7 @@ class _Recorder(Runner):
             self.unanswered = ask
             raise
         for name, (_, value) in VARIED.items():
-            values = np.append(value(ask), self.domain.get(name, ()))
+            values = np.append(value(ask), self.domain.get(name, ())) + 0.0  # a sticky throw's e is -0.0
             self.domain[name] = float(values.min()), float(values.max())
         return answer
 

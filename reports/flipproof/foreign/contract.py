@@ -205,8 +205,8 @@ class Answer:
 
     ``t`` [s], ``theta`` [rad], ``omega`` [rad/s], ``r_cm`` [m], ``inertia`` [kg m^2] have shape (P,), ``r`` [m] and
     ``v`` [m/s] (P, N). theta goes on beyond a turn, unwrapped; v is measured in the bottle, from cap to base. What the
-    solver did not give is None; r_cm and inertia follow from r by their definitions. The speeds of ``impacts`` have lost
-    the sign that they may have been given with.
+    solver did not give is None; r_cm and inertia follow from r by their definitions. Speeds of ``impacts`` are
+    without sign, however they were given.
     """
 
     t: FloatArray

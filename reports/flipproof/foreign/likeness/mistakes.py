@@ -142,6 +142,7 @@ OF_DAMPING: Final[Changes] = {
     "drag is missing": {"drag": 0.0},
     "drag drives slices instead of slowing them": {"drag": -1.0},
 }
+OF_SIGN: Final[Changes] = {"v' has the + gamma v of Eq. 9d as printed, with which nothing is damped": {"drag": 0.0}}
 WITHOUT_DAMPING: Final[Changes] = {
     "drag slows the slices, (alpha/m) r_i'": {"drag": 1.0},
     "drag drives the slices, (alpha/m) r_i'": {"drag": -1.0},
@@ -234,7 +235,7 @@ def _known(switches: Switches) -> tuple[tuple[str, Change], ...]:
         forces = {**FROM_CENTRE, **(AGAINST_TUBE if switches.signs else {})}
     groups: tuple[Changes, ...] = (
         COMMON,
-        OF_DAMPING if switches.signs else WITHOUT_DAMPING,
+        {**OF_DAMPING, **({} if switches.roots else OF_SIGN)} if switches.signs else WITHOUT_DAMPING,
         WITHOUT_WEIGHT if switches.weightless else OF_WEIGHT,
         {} if switches.roots else OF_GAMMA,
         forces,
