@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ode_reference.landing.layout import CREEPING, MAX_POOLS, MAX_SWEEPS
-from ode_reference.landing.pools import pool
+from ode_reference.landing.pools import pool_flying, pool_tube, reached
 from slicemodel.compiled import merged
 
 
@@ -50,11 +50,16 @@ def respond(x, tube, start, s1, s2, sine, cosine, angle, closed, target, world, 
     at_sine, at_cosine = (math.sin(angle), math.cos(angle)) if corners > 0 else (0.0, 1.0)
     axial, across, torque = 0.0, 0.0, 0.0
     expected = 0.0
+    on_base, on_cap = 0, world.n
+    if not world.rigid:
+        on_base, on_cap = reached(closed, world.n)
+        pool_flying(x, on_base, on_cap, closed, world, y, work[0], work[1], work[2])
     for outer in range(MAX_POOLS):
         if world.rigid:
             at, pooled = tube + axial / m_all, m_all
         else:
-            at, pooled = pool(x, tube + axial / world.tube, closed, world, y, work[0], work[1], work[2])
+            pushed = tube + axial / world.tube
+            at, pooled = pool_tube(x, pushed, on_base, on_cap, world, y, work[0], work[1], work[2])
         v_t = free[0] + (across * a22 - a12 * torque) / det
         omega = free[1] + (m_all * torque - a12 * across) / det
         if corners == 0 or (outer > 0 and abs(at - expected) <= 1e-12 * (1.0 + abs(at))):
