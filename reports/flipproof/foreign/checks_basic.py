@@ -951,8 +951,11 @@ def _leaves_program(traits: Traits, answer: Answer) -> str:
     program = solve(str(traits.equation), THROW, steps=len(answer.t))
     size = {"r": THROW.bottle.length, "v": abs(THROW.omega0) * THROW.bottle.length, "omega": abs(THROW.omega0)}
     size |= {"r_cm": THROW.bottle.length, "inertia": float(program.inertia[0]), "theta": 1.0}
+    of_r = {} if answer.r is None else _defined(answer)[0]  # what follows from r was perhaps not answered at all
     for k, name in product(range(len(answer.t)), STEP_OF_PROGRAM):
         given = getattr(answer, name)
+        if name in of_r and np.array_equal(given, of_r[name]):
+            continue
         if given is None or not (off := np.abs(given[k] - getattr(program, name)[k]) > PRINTED * size[name]).any():
             continue
         what = STEP_OF_PROGRAM[name]

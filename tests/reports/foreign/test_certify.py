@@ -229,6 +229,21 @@ def test_a_port_of_the_program_may_lag_and_turn_back_as_the_program_does(port):
     assert [result.verdict for result in certify(port(), names).results] == [PASSED] * 3
 
 
+def test_a_port_that_answers_no_centre_is_not_said_to_have_a_wrong_one():
+    patch = LISTS["twentyfifth"]["pyport_theta_with_new_omega"].solver()
+    solve = patch.solve if hasattr(patch, "solve") else patch
+
+    class Fewer:
+        equation, refined_by = "published-python", "steps"
+
+        def solve(self, ask):
+            found = solve(ask)
+            return {name: found[name] for name in ("t", "theta", "omega", "r", "v")}
+
+    (result,) = certify(InProcess(Fewer(), "fewer"), ["published-vectors"]).results
+    assert "theta leaves the program: look at with which omega" in result.line
+
+
 def test_the_published_numbers_are_kept_by_whose_they_are():
     (kept,) = certify(opened("published-python"), ["published-vectors"]).results
     assert kept.verdict == PASSED
