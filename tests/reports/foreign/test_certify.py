@@ -223,25 +223,53 @@ def test_rebounds_on_the_grid_are_seen_at_other_steps_and_slices(monkeypatch, sl
     assert result.observation.facts["order_across_impacts"] < 0.4
 
 
-@pytest.mark.parametrize("port", [lambda: opened("published-python"), lambda: InProcess(RIGHT["pyport"].solver(), "x")])
+class Port:
+    """A port of the paper's program."""
+
+    equation, refined_by = "published-python", "steps"
+
+    def solve(self, ask):
+        return RIGHT["pyport"].solver()(ask)
+
+
+@pytest.mark.parametrize("port", [lambda: opened("published-python"), lambda: InProcess(Port(), "x")])
 def test_a_port_of_the_program_may_lag_and_turn_back_as_the_program_does(port):
     names = ["published-vectors", "definitions", "velocity"]
     assert [result.verdict for result in certify(port(), names).results] == [PASSED] * 3
 
 
 def test_a_port_that_answers_no_centre_is_not_said_to_have_a_wrong_one():
-    patch = LISTS["twentyfifth"]["pyport_theta_with_new_omega"].solver()
-    solve = patch.solve if hasattr(patch, "solve") else patch
+    solve = LISTS["twentyfifth"]["pyport_theta_with_new_omega"].solver()
 
-    class Fewer:
-        equation, refined_by = "published-python", "steps"
-
+    class Fewer(Port):
         def solve(self, ask):
             found = solve(ask)
             return {name: found[name] for name in ("t", "theta", "omega", "r", "v")}
 
     (result,) = certify(InProcess(Fewer(), "fewer"), ["published-vectors"]).results
     assert "theta leaves the program: look at with which omega" in result.line
+
+
+def test_a_lag_of_the_inertia_hides_no_wrong_centre():
+    class Aside(Port):
+        def solve(self, ask):
+            found = super().solve(ask)
+            return found | {"r_cm": found["r_cm"] + 1e-3 * ask.scenario.bottle.length}
+
+    (result,) = certify(InProcess(Aside(), "aside"), ["definitions"]).results
+    assert result.verdict == FAILED
+    assert "r_cm off by" in result.line
+
+
+def test_a_port_with_every_slice_on_an_end_gets_a_verdict():
+    class Stuck(Port):
+        def solve(self, ask):
+            found = super().solve(ask)
+            on_base = np.full_like(found["r"], ask.scenario.r_max)
+            return found | {"r": on_base, "v": np.ones_like(on_base)}
+
+    (result,) = certify(InProcess(Stuck(), "stuck"), ["velocity"]).results
+    assert result.verdict == FAILED
 
 
 def test_the_published_numbers_are_kept_by_whose_they_are():
@@ -732,7 +760,7 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
             "definitions",
             "slices leave the cap at 0.707 of their speed, the root of e",
         ),
-        ("walldrag_tube_kept", "start", "an answer from another start is not that of before: cache nothing"),
+        ("walldrag_tube_kept", "start", "cache nothing by throw: the start is part of the question"),
         ("limiter_own_inertia_forgotten", "inputs", "the radius acts in J alone, by M_b (R^2/2 + L^2/12)"),
         ("limiter_water_about_itself", "definitions", "the slices are taken about mean(r) instead of r_CM"),
         ("limiter_shell_about_water", "definitions", "the bottle is taken about mean(r) instead of r_CM"),
