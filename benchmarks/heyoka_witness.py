@@ -27,7 +27,7 @@ from ode_reference.contact import Ends, resolve
 from ode_reference.impacts import immovable, simultaneous
 from ode_reference.models import MODELS
 from ode_reference.motion import Motion, Throw
-from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
+from ode_reference.solver import usual_rest_speed
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import BASE, CAP, Impacts
 
@@ -77,7 +77,7 @@ def fly(case: Case, kind: type = float) -> Found:
     scenario, n = case.scenario, case.scenario.n_slices
     switches = MODELS[case.model].switches
     law = simultaneous if switches.recoil else immovable
-    rest_speed = REST_SPEED_WITH_RECOIL if switches.recoil else REST_SPEED
+    rest_speed = usual_rest_speed(switches, scenario)
     ends = Ends.of(scenario, recoil=switches.recoil)
     motion = Motion(Throw.of(scenario), MODELS[case.model], np.zeros(n, bool))
     system, pushes = equations(scenario, case.model)

@@ -60,7 +60,10 @@ REST_SPEED: Final = 1e-5
 """Default speed below which a slice stays on its end [m/s], for models without recoil."""
 
 REST_SPEED_WITH_RECOIL: Final = 1e-3
-"""The same with recoil [m/s]."""
+"""The same with recoil [m/s], where omega_0 L is ``FAST`` or more."""
+
+FAST: Final = 5.6
+"""omega_0 L of the paper's throw [m/s]; below it the rest speed with recoil is as much smaller as omega_0 L is."""
 
 MIN_REST_SPEED: Final = 1e-8
 """Lowest rest speed that may be asked for [m/s]."""
@@ -109,9 +112,9 @@ def solve(
         duration / 1e6 [s], by default 1 / |omega0|, within duration / 1e5 and duration, which binds only at rtol above
         1e-5: no slice has the time to turn twice within a quarter of a step.
     rest_speed : float, optional
-        Speed below which a slice that an end pushes back stays there, in [1e-8, 0.1] [m/s]. By default 1e-5, and 1e-3
-        with recoil: there the tube shakes resting slices off at every impact, and a tenth of the rest speed makes
-        several times as many impacts without narrowing the band of omega.
+        Speed below which a slice that an end pushes back stays there, in [1e-8, 0.1] [m/s]. By default 1e-5, and with
+        recoil ``usual_rest_speed``, 1e-3 in the paper's throw: there the tube shakes resting slices off at every
+        impact, and a tenth of the rest speed makes several times as many impacts without narrowing the band of omega.
     energy : bool
         Whether to keep the energy ledger, ``diagnostics["energy"]`` [J] (``ode_reference.energy``): "initial", "final",
         the work of each term, of impacts and of rests, and the "residual" that none of them explains.
@@ -181,7 +184,7 @@ def solve(
         return cast(Trajectory, run)
     chosen = model_named(model)
     known_name("method", method, (TAYLOR, *INTEGRATORS))
-    speed, twin = _rest_speed(rest_speed, chosen), _twin(twin)
+    speed, twin = _rest_speed(rest_speed, chosen, scenario), _twin(twin)
     t_out = output_times(scenario, times)
     check_states(scenario.n_slices, len(t_out), "cut it coarser, or ask for fewer times")
     if method != TAYLOR:
@@ -277,7 +280,7 @@ def solve_batch(
     if states:
         slices = sum(throw.n_slices for throw in throws)
         check_states(slices, t_out.shape[1], "leave out states, or solve fewer throws at a time")
-    settings = _settings(chosen, _rest_speed(rest_speed, chosen), energy, _twin(twin))
+    settings = [_settings(chosen, _rest_speed(rest_speed, chosen, throw), energy, _twin(twin)) for throw in throws]
     return api.fly_all(throws, t_out, jobs, chosen.switches, settings, states=states)
 
 
@@ -287,10 +290,22 @@ def _settings(model: Model, rest_speed: float, energy: bool, twin: int) -> dict[
     return settings | ({"twin": twin} if twin else {})
 
 
-def _rest_speed(given: float | None, model: Model) -> float:
+def usual_rest_speed(switches: Switches, scenario: Scenario) -> float:
+    """Return the default rest speed of a throw [m/s].
+
+    Without recoil it hardly matters. With recoil it is a fraction of the speeds in the throw: what a fixed one cuts off
+    of a slow flight, or of a small bottle's, moves omega by more than its band.
+    """
+    if not switches.recoil:
+        return REST_SPEED
+    slowness = min(1.0, abs(scenario.omega0) * scenario.bottle.length / FAST)
+    return max(REST_SPEED, REST_SPEED_WITH_RECOIL * slowness)
+
+
+def _rest_speed(given: float | None, model: Model, scenario: Scenario) -> float:
     """Return the rest speed of a run [m/s]."""
     if given is None:
-        return REST_SPEED_WITH_RECOIL if model.switches.recoil else REST_SPEED
+        return usual_rest_speed(model.switches, scenario)
     return number_within("rest_speed", given, MIN_REST_SPEED, 0.1, unit=" m/s")
 
 

@@ -166,17 +166,27 @@ class Batch(Sequence[Trajectory]):
         return self.flights[k]
 
 
-def fly_all(throws: Sequence[Scenario], t_out: FloatArray, jobs: int | None, *ask: Any, states: bool) -> Batch:
+def fly_all(
+    throws: Sequence[Scenario],
+    t_out: FloatArray,
+    jobs: int | None,
+    switches: Switches,
+    settings: Sequence[Mapping[str, Any]],
+    *,
+    states: bool,
+) -> Batch:
     """Fly all throws by so many threads, one per core if not said.
 
     Parameters
     ----------
     t_out : array, shape (K, P) - output times of each [s]
-    ask, states - as of ``fly``
+    settings : sequence of K mappings - those of each, as of ``fly``
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with ThreadPoolExecutor(jobs or cores) as pool:
-        flights = tuple(pool.map(lambda *throw: fly(*throw, *ask, states=states), throws, t_out))
+        flights = tuple(
+            pool.map(lambda k: fly(throws[k], t_out[k], switches, settings[k], states=states), range(len(throws)))
+        )
     theta, omega = np.full(t_out.shape, np.nan), np.full(t_out.shape, np.nan)
     for k, flight in enumerate(flights):
         theta[k, : len(flight.t)], omega[k, : len(flight.t)] = flight.theta, flight.omega

@@ -47,6 +47,33 @@ def test_a_full_bottle_stays_its_own_mirror_image():
     assert ode_reference.solve(full, "free-flight", twin=1).diagnostics["opposite_hits"] > 0
 
 
+def slower(throw, factor):
+    """Return a throw in which everything moves ``factor`` times as fast."""
+    return replace(
+        throw, omega0=factor * throw.omega0, gravity=factor**2 * throw.gravity, drag=factor * throw.drag,
+        duration=throw.duration / factor,
+    )  # fmt: skip
+
+
+def test_a_slow_throw_is_as_accurate_as_the_fast_one_like_it():
+    slow = slower(THROW, 1 / 16)
+    flights = ode_reference.solve_batch([THROW, slow], "free-flight")
+    for throw, flight in zip((THROW, slow), flights, strict=True):
+        assert flight.settings == ode_reference.solve(throw, "free-flight").settings
+    assert flights[1].settings["rest_speed"] == pytest.approx(flights[0].settings["rest_speed"] / 16)
+    np.testing.assert_allclose(flights[1].omega * 16, flights[0].omega, rtol=0, atol=1e-9 * THROW.omega0)
+
+
+@pytest.mark.parametrize("water_mass", [0.1, 0.2, 0.3, 0.4])
+def test_the_band_of_a_slow_throw_holds_whatever_the_rest_speed(water_mass):
+    throw = slower(Scenario(n_slices=5, drag=1e-3, water_mass=water_mass, restitution=0.5), 1 / 25)
+    flight = ode_reference.solve(throw, "free-flight")
+    finest = ode_reference.solve(throw, "free-flight", flight.t, rest_speed=1e-8)
+    band = np.maximum(estimate_band(flight).size, 1e-6) * throw.omega0
+    assert np.all(np.abs(finest.omega - flight.omega) <= band)
+    assert band[-1] < 3e-3 * throw.omega0
+
+
 @pytest.mark.parametrize("method", ["taylor", "DOP853"])
 def test_a_twin_is_repeatable_and_keeps_the_throw(method):
     throw = replace(THROW, duration=0.1)

@@ -31,7 +31,7 @@ from flipproof.foreign.checking import THROW, CheckGenerator, NotApplicableError
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import name_of, placing, switches_of
-from flipproof.frame.twins import usual_rest_speed
+from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL, usual_rest_speed
 from ode_reference.switches import Switches
 from slicemodel import Bottle, Scenario, Trajectory
 from slicemodel.trajectory import FloatArray, Impacts
@@ -339,16 +339,21 @@ def _reference_flight(switches: Switches, throw: Scenario, times: bytes, rest_sp
 
 
 def references(equation: str, ask: Ask) -> list[Trajectory]:
-    """Return the exact flight of an equation from the ask's start, and twins in release and in rest speed."""
+    """Return the exact flight of an equation from the ask's start, and twins in release and in rest speed.
+
+    A solver's rest speed is its own affair: with recoil it may be a fixed one or a fraction of the speeds of the throw.
+    """
     switches = switches_of(equation)
-    throw, usual, times = started(ask), usual_rest_speed(switches.name), ask.times.tobytes()
+    throw, times = started(ask), ask.times.tobytes()
     bottle = replace(throw.bottle, mass=throw.bottle.mass * (1 + 1e-6))
     perturbed = replace(throw, bottle=bottle, omega0=throw.omega0 * (1 + 1e-6))
-    rest = 1e-3 if usual < 1e-3 else 1e-4
+    fixed, other = REST_SPEED, 1e-3
+    if switches.recoil:
+        fixed, other = REST_SPEED_WITH_RECOIL, usual_rest_speed(switches, throw) / 10
     return [
-        _reference_flight(switches, throw, times, usual),
-        _reference_flight(switches, perturbed, times, usual),
-        _reference_flight(switches, throw, times, rest),
+        _reference_flight(switches, throw, times, fixed),
+        _reference_flight(switches, perturbed, times, fixed),
+        _reference_flight(switches, throw, times, other),
     ]
 
 
@@ -439,10 +444,13 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
             first_wrong = min(first_wrong, float(ask.times[:reached][clear][row]))
     if finest.impacts is not None and clear.any():
         room_of_r = rooms.get("r", rooms["omega"])[clear]
-        if unmatched := _unmatched(
-            ask, finest.impacts, truth.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear]
-        ):
-            wrong["impacts"] = unmatched
+        by_rest_speed = [
+            _unmatched(ask, finest.impacts, run.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear])
+            for run in (truth, twins[-1])
+        ]
+        unmatched = [miss for miss in by_rest_speed if miss is not None]
+        if len(unmatched) == len(by_rest_speed):
+            wrong["impacts"] = unmatched[0]
     impacts_passed, onset = _onset(ask, truth.impacts or NO_IMPACTS, first_wrong) if wrong else (0, "")
     return Comparison(
         wrong=wrong,

@@ -12,7 +12,7 @@ import numpy as np
 import ode_reference
 from flipproof.foreign.contract import Answer, Ask, Started, begun
 from flipproof.foreign.place import switches_of
-from flipproof.frame.twins import usual_rest_speed
+from ode_reference.solver import usual_rest_speed
 from slicemodel.observables import moment_of_inertia
 from slicemodel.trajectory import BASE, CAP, FloatArray
 
@@ -94,7 +94,7 @@ def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[I
     """Carry on from the state at each output to the next."""
     throw, switches = ask.scenario, switches_of(equation)
     length, spin = throw.bottle.length, abs(throw.omega0)
-    rest_speed = usual_rest_speed(switches.name)
+    rest_speed = usual_rest_speed(switches, throw)
     scale = {"omega": spin, "r": length, "v": length * spin}
     assert answer.r is not None
     assert answer.v is not None
@@ -108,7 +108,7 @@ def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[I
         theta, omega, span = float(answer.theta[k]), float(answer.omega[k]), float(answer.t[k + 1] - answer.t[k])
         try:
             state = begun(throw, places, theta0=theta, omega0=omega, duration=span)
-            flight = ode_reference.solve(state, switches, [0.0, span], speeds=v[0])
+            flight = ode_reference.solve(state, switches, [0.0, span], rest_speed=rest_speed, speeds=v[0])
         except ValueError:
             break  # a state that is no throw: the answer went wrong long before
         if len(flight.t) < 2 or flight.impacts is None:

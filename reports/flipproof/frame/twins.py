@@ -16,10 +16,11 @@ import numpy as np
 
 from flipproof.frame.flights import Call
 from flipproof.frame.solvers import Missing, Run, make
+from ode_reference import solver
 from ode_reference.bands import CUT, SAFETY, TWINS, band_of, estimate_band
 from ode_reference.models import MODELS
-from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
 from ode_reference.switches import Switches
+from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray, Trajectory
 
 FLOOR: Final = 1e-9
@@ -40,16 +41,16 @@ BAND_WORDS: Final = (
 def twins(run: Run) -> tuple[Run, ...]:
     """Return the twins of a run of an equation at its usual rest speed, and last the run at a tenth of that."""
     changes: list[tuple[str, dict[str, Any]]] = [(f"twin {k}", {"twin": k}) for k in range(1, TWINS + 1)]
-    changes.append(("a tenth of the rest speed", {"rest_speed": usual_rest_speed(run.solver) / CUT}))
+    changes.append(("a tenth of the rest speed", {"rest_speed": usual_rest_speed(run.solver, run.scenario) / CUT}))
     return tuple(
         replace(run, label=f"{run.name}, {words}", settings={**run.settings, **change}) for words, change in changes
     )
 
 
-def usual_rest_speed(model: str) -> float:
-    """Return the rest speed of an equation, by its name or that of its switches [m/s]."""
+def usual_rest_speed(model: str, scenario: Scenario) -> float:
+    """Return the rest speed of a throw under an equation, by its name or that of its switches [m/s]."""
     switches = MODELS[model].switches if model in MODELS else Switches.from_name(model)
-    return REST_SPEED_WITH_RECOIL if switches.recoil else REST_SPEED
+    return solver.usual_rest_speed(switches, scenario)
 
 
 def band(run: Run, values: Mapping[Run, float]) -> float:

@@ -136,7 +136,7 @@ def study(ask: Ask) -> Study[Mapping[str, Agreement]]:
     for equation in EQUATIONS:
         engines = [name for name, engine in ENGINES.items() if engine.model == equation]
         settings = witnessed(ask.throw, equation)
-        coarse = {**settings, "rtol": 1e-9, "atol": 1e-12, "rest_speed": usual_rest_speed(equation)}
+        coarse = {**settings, "rtol": 1e-9, "atol": 1e-12, "rest_speed": usual_rest_speed(equation, ask.throw)}
         runs[equation] = {
             equation: ask.solvers[equation],
             SOLVE_IVP: Run(equation, ask.throw, settings, f"{equation}, {SOLVE_IVP}"),

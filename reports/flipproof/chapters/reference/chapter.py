@@ -38,7 +38,7 @@ def study(ask: Ask) -> Study[Results]:
 
 def witnessed(scenario: Scenario, model: str) -> dict[str, Any]:
     """Return the settings of the witness: short steps, tight tolerances and a tenth of the usual rest speed."""
-    longest, rest_speed = 0.01 / abs(scenario.omega0), usual_rest_speed(model) / CUT
+    longest, rest_speed = 0.01 / abs(scenario.omega0), usual_rest_speed(model, scenario) / CUT
     return {"method": "DOP853", "rtol": 1e-11, "atol": 1e-14, "rest_speed": rest_speed, "max_step": longest}
 
 
