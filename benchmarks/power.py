@@ -70,7 +70,7 @@ MISSED: Final = (
     "single_midpoint_compensation_added", "kick_drift_stopped_momentum_lost", "series_weak_pushes_hold_nothing",
     "adams_pece_history_across_release", "abm_impact_at_step_end", "hamilton_reports_past_impact",
     "hamilton_first_in_the_list", "newmark_reports_last_tick", "strang_omega_one_step_old",
-    "limiter_rest_of_step_lost", "limiter_one_bounce_a_step",
+    "limiter_rest_of_step_lost", "limiter_one_bounce_a_step", "angle_rk4_rule_of_three",
 )  # fmt: skip
 """Mistakes known to be missed."""
 

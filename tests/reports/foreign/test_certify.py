@@ -13,6 +13,7 @@ from planted.ours import MISTAKES
 from planted.right import RIGHT
 from planted.subject import Subject
 from power import LISTS
+from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 import ode_reference
 from flipproof.foreign import checks_measured
@@ -42,6 +43,7 @@ from flipproof.foreign.solving import opened
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
 from slicemodel import Scenario
+from slicemodel.observables import moment_of_inertia
 
 
 class Exact:
@@ -248,6 +250,52 @@ def test_a_port_that_answers_no_centre_is_not_said_to_have_a_wrong_one():
 
     (result,) = certify(InProcess(Fewer(), "fewer"), ["published-vectors"]).results
     assert "theta leaves the program: look at with which omega" in result.line
+
+
+class BetweenSteps:
+    """Exact on a grid of its own, and between its points of the ``order`` at which r is interpolated."""
+
+    equation, refined_by, order = "eq8", "dt", 4
+
+    def __init__(self, interpolated):
+        self.interpolated = interpolated
+
+    def solve(self, ask):
+        grid = ask.effort * np.arange(np.ceil(ask.times[-1] / ask.effort - 1e-9) + 1)
+        throw = replace(started(ask), duration=max(ask.scenario.duration, float(grid[-1])))
+        flight = ode_reference.solve(throw, self.equation, grid)
+        theta, r = (
+            self.interpolated(grid, values, slopes)(ask.times)
+            for values, slopes in ((flight.theta, flight.omega), (flight.r, flight.v))
+        )
+        momentum = moment_of_inertia(throw, ask.start) * throw.omega0
+        return {"t": ask.times, "theta": theta, "omega": momentum / moment_of_inertia(throw, r), "r": r}
+
+
+def test_an_answer_between_steps_may_be_of_the_order_of_the_steps_wherever_it_lies():
+    (cubic,) = certify(InProcess(BetweenSteps(CubicHermiteSpline), "cubic"), ["order-before-impacts"]).results
+    assert (cubic.verdict, cubic.observation.facts["order_before_impacts"]) == (PASSED, pytest.approx(4.0, abs=0.3))
+
+    def straight(t, values, _):
+        return make_interp_spline(t, values, k=1)
+
+    (linear,) = certify(InProcess(BetweenSteps(straight), "linear"), ["order-before-impacts"]).results
+    assert (linear.verdict, linear.observation.facts["order_before_impacts"]) == (FAILED, pytest.approx(2.0, abs=0.3))
+
+
+@pytest.mark.parametrize("knobs", [SMALL, SLOW])
+@pytest.mark.parametrize("share", [1e-3 / 5.6, 1e-6])
+def test_a_rest_speed_may_be_any_small_share_of_the_speeds(knobs, share):
+    class Resting:
+        equation, refined_by = "switches:111101", "rtol"
+
+        def solve(self, ask):
+            speed = share * abs(ask.scenario.omega0) * ask.scenario.bottle.length
+            return ode_reference.solve(started(ask), self.equation, ask.times, rest_speed=max(1e-8, speed))
+
+    solver = InProcess(Resting(), "resting")
+    (found,) = drive(comparing(solver.traits, [knobs], SEED, Resting.equation, 0.01), solver)
+    assert not found.wrong
 
 
 def test_a_lag_of_the_inertia_hides_no_wrong_centre():
