@@ -528,20 +528,23 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     lags = _lags(traits) and traits.refined_by is not None
     answer, *finer = yield [ask_of(traits, THROW, level) for level in ((0, 2) if lags else (0,))]
     bound = max(2e-5, 64 * traits.epsilon)  # six printed digits are right
+    given = [name for name in DEFINED if name in answer.given]
     if (hits := answer.impacts) is not None and len(hits):
         error = np.abs(hits.speed_after - THROW.restitution * hits.speed_before) * (hits.speed_after > 0)
         error /= max(float(np.max((hits.speed_before, hits.speed_after))), 1e-300)
-        if not error.max() <= 0.02:  # they may be read off two steps
+        holds = bool(error.max() <= 0.02)  # they may be read off two steps
+        if not (holds and answer.r is not None and given):
             return Observation(
-                holds=False,
+                holds=holds,
                 expected="speed_after = e speed_before of each of the impacts, or 0",
                 observed=f"off by {error.max():.2g} of the largest speed",
                 where=time_of_max(hits.time, error),
                 advice=_rebound_advice(hits),
             )
-    if answer.r is None:
-        raise NotApplicableError("no r is given")
-    derived, errors = _defined(answer)
+    if answer.r is None or not given:
+        raise NotApplicableError("no r is given" if answer.r is None else "neither r_cm nor inertia is given")
+    derived, all_errors = _defined(answer)
+    errors = {name: all_errors[name] for name in given}
     by_level = [errors, *(_defined(one)[1] for one in finer)]
     sizes = {name: [float(each[name].max()) for each in by_level] for name in errors}
     wrong = [name for name in sizes if not (sizes[name][0] <= bound or _falls(sizes[name]))]
@@ -676,7 +679,7 @@ def _parts_advice(r: FloatArray, inertia: FloatArray) -> str:
 
 def _decimals_advice(answer: Answer) -> str:
     """Return that the inertia is printed with few decimals, if it is: in kg m^2 that leaves few digits."""
-    if answer.inertia is None or "inertia" not in answer.given:
+    if answer.inertia is None or "inertia" in answer.derived:
         return ""
     decimals = decimals_of([answer.inertia], range(3, 10))
     return f"inertia has {decimals} decimals, which are few digits: print all digits (%.17g); " if decimals else ""
@@ -952,12 +955,11 @@ def _leaves_program(traits: Traits, answer: Answer) -> str:
     program = solve(str(traits.equation), THROW, steps=len(answer.t))
     size = {"r": THROW.bottle.length, "v": abs(THROW.omega0) * THROW.bottle.length, "omega": abs(THROW.omega0)}
     size |= {"r_cm": THROW.bottle.length, "inertia": float(program.inertia[0]), "theta": 1.0}
-    of_r = {} if answer.r is None else _defined(answer)[0]  # what follows from r was perhaps not answered at all
     for k, name in product(range(len(answer.t)), STEP_OF_PROGRAM):
-        given = getattr(answer, name)
-        if name in of_r and np.array_equal(given, of_r[name]):
+        if name not in answer.given:
             continue
-        if given is None or not (off := np.abs(given[k] - getattr(program, name)[k]) > PRINTED * size[name]).any():
+        off = np.abs(getattr(answer, name)[k] - getattr(program, name)[k]) > PRINTED * size[name]
+        if not off.any():
             continue
         what = STEP_OF_PROGRAM[name]
         if name not in ("r", "v"):

@@ -205,8 +205,8 @@ class Answer:
 
     ``t`` [s], ``theta`` [rad], ``omega`` [rad/s], ``r_cm`` [m], ``inertia`` [kg m^2] have shape (P,), ``r`` [m] and
     ``v`` [m/s] (P, N). theta goes on beyond a turn, unwrapped; v is measured in the bottle, from cap to base. What the
-    solver did not give is None; r_cm and inertia follow from r by their definitions. Speeds of ``impacts`` are
-    without sign, however they were given.
+    solver did not give is None; r_cm and inertia follow from r by their definitions if they are ``derived``. Speeds of
+    ``impacts`` are without sign, however they were given.
     """
 
     t: FloatArray
@@ -217,11 +217,16 @@ class Answer:
     r: FloatArray | None = None
     v: FloatArray | None = None
     impacts: Impacts | None = None
+    derived: tuple[str, ...] = ()
 
     @property
     def given(self) -> tuple[str, ...]:
         """Names of the fields that the solver gave."""
-        return tuple(name for name in self.__slots__ if getattr(self, name) is not None)
+        return tuple(
+            name
+            for name in (*REQUIRED, *PER_TIME, *PER_SLICE, "impacts")
+            if getattr(self, name) is not None and name not in self.derived
+        )
 
 
 def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
@@ -254,11 +259,12 @@ def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
         raise AnswerError(f"t[{k}] = {t[k]:.9g} s, asked was {ask.times[k]:.9g} s; answer at the times asked")
     else:
         arrays["t"] = ask.times
-    if "r" in arrays:
-        arrays.setdefault("r_cm", centre_of_mass(ask.scenario, arrays["r"]))
-        arrays.setdefault("inertia", moment_of_inertia(ask.scenario, arrays["r"]))
+    derived = tuple(name for name in PER_TIME if "r" in arrays and name not in arrays)
+    for name, definition in zip(PER_TIME, (centre_of_mass, moment_of_inertia), strict=True):
+        if name in derived:
+            arrays[name] = definition(ask.scenario, arrays["r"])
     impacts = _impacts_of(fields["impacts"], ask.scenario.n_slices) if "impacts" in fields else None
-    return Answer(**arrays, impacts=impacts)
+    return Answer(**arrays, impacts=impacts, derived=derived)
 
 
 def _field(given: object, name: str) -> Any:

@@ -179,10 +179,27 @@ LONG = ("piecewise", "restitution", "order-across-impacts", "equation", "gravity
 """Checks that ``benchmarks/power.py`` makes of the good solver, and ``test_our_own_solvers_pass`` of faster ones."""
 
 
+class WithCentre(Subject):
+    """A good solver that answers everything but impacts."""
+
+    def solve(self, ask):
+        found = super().solve(ask)
+        centre = (found["r"].mean(axis=1), ask.scenario.bottle.length / 2)
+        water, bottle = ask.scenario.water_mass, ask.scenario.bottle.mass
+        found["r_cm"] = (water * centre[0] + bottle * centre[1]) / (water + bottle)
+        return found | {"inertia": moment_of_inertia(ask.scenario, found["r"])}
+
+
 @pytest.mark.parametrize("check", [name for name in CHECKS if name not in LONG])
 def test_a_good_solver_passes(check):
-    (result,) = certify(InProcess(Subject(), "good"), [check]).results
+    (result,) = certify(InProcess(WithCentre(), "good"), [check]).results
     assert result.verdict == PASSED, result.line
+
+
+def test_what_follows_from_the_places_is_not_judged():
+    (result,) = certify(InProcess(Subject(), "good"), ["definitions"]).results
+    assert result.verdict == IDLE
+    assert "neither r_cm nor inertia is given" in result.line
 
 
 @pytest.mark.parametrize("name", ["midpoint", "free-flight"])

@@ -92,6 +92,7 @@ def test_mappings_objects_and_trajectories_are_answers():
 
 def test_centre_and_inertia_follow_from_positions():
     found = answer_of(ASK, CURVE | {"r": R})
+    assert found.given == ("t", "theta", "omega", "r")
     np.testing.assert_array_equal(found.r_cm, centre_of_mass(THROW, R))
     np.testing.assert_array_equal(found.inertia, moment_of_inertia(THROW, R))
 
