@@ -62,9 +62,12 @@ window.flipproofLive = (() => {
     }
   }
 
-  // Omega of Eq. 8, or of free flight, at equal times. A slice slower than `rest` that its end presses on rests there.
+  const restSpeed = ({ omega0, bottle }) => Math.max(1e-5, 1e-3 * Math.min(1, (Math.abs(omega0) * bottle.length) / 5.6));
+
+  // Omega of Eq. 8, or of free flight, at equal times. A slice slower than `rest` that its end presses on rests there;
+  // in free flight `rest` is a share of the speeds in the throw.
   // `seen` hears at each of these times the places of the slices, the angle and the centre of mass.
-  function flow(thrown, free, points = 1000, seen = null, parts = free ? 2 : 1, rest = free ? 1e-3 : 1e-5) {
+  function flow(thrown, free, points = 1000, seen = null, parts = free ? 2 : 1, rest = free ? restSpeed(thrown) : 1e-5) {
     const { n, m, M, mass, wall, y, v, inertia, momentum, gamma, g, e, theta0, duration } = prepared(thrown);
     const side = y.map((place) => (Math.abs(place) === wall ? Math.sign(place) : 0)), ratio = m / mass, drag = 2 * gamma;
     const rows = () => Array.from({ length: 5 }, () => new Float64Array(n)), [ys, vs, as] = [rows(), rows(), rows()];
