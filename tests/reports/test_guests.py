@@ -251,6 +251,7 @@ def test_a_dead_worker_costs_its_guest(monkeypatch):
     ("arguments", "said"),
     [
         (["--with", "nowhere.py:solve"], "there is no file nowhere.py"),
+        (["--with", "rk4.py"], "name the object in the file, too: rk4.py:solve"),
         (["--with", RK4] * 2, "is there twice"),
         (["--with", "eq8"], "--with eq8 names flipproof's own solver; flipproof certify eq8 tests it"),
     ],

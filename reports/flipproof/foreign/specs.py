@@ -59,8 +59,8 @@ def is_foreign(spec: str) -> bool:
 
 
 def is_spec(name: str) -> bool:
-    """Return whether a name is written as the spec of a foreign solver, or is that of an entry point."""
-    return is_foreign(name) and (":" in name or name in offered())
+    """Return whether a name is written as the spec of a foreign solver, is its file, or that of an entry point."""
+    return is_foreign(name) and (":" in name or name.endswith(".py") or name in offered())
 
 
 def check_spec(spec: str) -> None:
