@@ -154,6 +154,8 @@ def test_files_of_any_columns_are_compared(tmp_path, capsys, suffix):
         ({"s": [0, 1], "x": [0, 1]}, ("no column t", "s, x")),
         ({"t": [0], "x": [0]}, ("'t'", "1 rows")),
         ({"t": [0, 1]}, ("no column beside",)),
+        ({"t": [0, 1], "x": [0, 1, 2]}, ("no column beside 't' (2,), but 'x' (3,)",)),
+        ({}, ("no column t", "it has none")),
     ],
 )
 def test_what_is_wrong_with_a_table_is_named(table, named):

@@ -61,7 +61,7 @@ def curves(
         time = next((name for name in TIMES if name in names), None)
         if time is None:
             raise ValueError(
-                f"{label}: has no column {' or '.join(TIMES[:2])}; it has {shortened(', '.join(names), 80)}"
+                f"{label}: has no column {' or '.join(TIMES[:2])}; it has {shortened(', '.join(names), 80) or 'none'}"
             )
     for name in (time, *(columns or ())):
         if name not in names:
@@ -82,7 +82,9 @@ def curves(
         if len(values) != len(t):
             raise ValueError(f"{label}: column {name!r} has {len(values)} rows, {time!r} has {len(t)}")
     if not arrays:
-        raise ValueError(f"{label}: has no column beside {time!r} to compare")
+        others = ", ".join(f"{name!r} {np.shape(table[name])}" for name in names if name not in (time, "t_events"))
+        shapes = f" {t.shape}, but {shortened(others, 80)}" if others else ""
+        raise ValueError(f"{label}: has no column beside {time!r}{shapes} to compare")
     events = None if t_events is None else np.sort(_numbers(label, "t_events", t_events))
     return Curves(label, t, arrays, events)
 
