@@ -607,7 +607,8 @@ def test_frozen_throws_are_not_counted_twice(tmp_path, capsys):
 def test_a_throw_without_gravity_lands_nowhere(tmp_path, capsys):
     throw = tmp_path / "throw.toml"
     throw.write_text("[scenario]\ngravity = 0.0\n")
-    refused(capsys, "gravity = 0 m/s^2: nothing falls on a table", "upright", throw, "--out", tmp_path / "out")
+    for name, *options in (("upright", "--out", tmp_path / "out"), ("land",), ("land", "--height", "0.2")):
+        refused(capsys, "gravity = 0 m/s^2: nothing falls on a table", name, throw, *options)
 
 
 def test_a_landing_says_what_was_assumed_and_of_how_many_slices(tmp_path, capsys):

@@ -88,6 +88,7 @@ def _add_table(command: argparse.ArgumentParser) -> None:
 def command_land(options: argparse.Namespace) -> int:
     """Throw one bottle on a table and say how it lands."""
     throw = read_scenario(options.scenario, options.slices, SLICES)
+    _check_weight(throw)
     from flipproof.chapters.landing.single import describe, land_throw
     from flipproof.chapters.landing.study import standing
     from flipproof.chapters.landing.throws import aimed
@@ -109,6 +110,12 @@ def command_land(options: argparse.Namespace) -> int:
     return 0
 
 
+def _check_weight(throw: Any) -> None:
+    """Refuse a throw that nothing lets fall on a table."""
+    if throw.gravity == 0.0:
+        raise ValueError("gravity = 0 m/s^2: nothing falls on a table")
+
+
 def command_upright(options: argparse.Namespace) -> int:
     """Make the throws of the study that have no row yet, and write its tables and figures."""
     throw = read_scenario(options.scenario, options.slices or SLICES)
@@ -121,8 +128,7 @@ def command_upright(options: argparse.Namespace) -> int:
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
     families = tuple(dict.fromkeys(name.strip() for name in options.families.split(",")))
     refuse_unknown("--families", families, FAMILIES)
-    if throw.gravity == 0.0:
-        raise ValueError("gravity = 0 m/s^2: nothing falls on a table")
+    _check_weight(throw)
     if throw.frozen:
         raise ValueError("scenario.frozen = true: the study throws water and ice beside it; leave it out")
     size = Size(
