@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.frame.flights import Call
-from flipproof.frame.solvers import Missing, Run, make
+from flipproof.frame.solvers import Missing, Run, make, solve
 from ode_reference import solver
 from ode_reference.bands import CUT, SAFETY, TWINS, band_of, estimate_band
 from ode_reference.models import MODELS
@@ -28,6 +28,9 @@ FLOOR: Final = 1e-9
 
 TRUSTED: Final = 1e-3
 """Band up to which omega(t) is trusted unless another tolerance is asked for, fraction of omega_0."""
+
+COARSE: Final = 0.01
+"""Change of omega with half the step from which a scheme's step is called coarse, fraction of omega_0."""
 
 SLOW: Final = 10.0
 """Seconds of a flight from which its twins are not flown unasked: they take nine times as long."""
@@ -77,8 +80,20 @@ def omega_band_call(run: Run) -> Call:
 def doubt(flight: Trajectory, seconds: float, tolerance: float = TRUSTED) -> str:
     """Return up to when omega(t) of a flight may be trusted to a tolerance [omega_0]; nothing if that is to its end.
 
-    ``seconds`` is how long the flight took. Of a solver without twins nothing is said.
+    ``seconds`` is how long the flight took. Of a scheme it is said if its step is ``COARSE``; of other solvers without
+    twins nothing is said.
     """
+    if flight.solver == "slicemodel" and flight.ok and seconds < SLOW:
+        finer = solve(
+            flight.method,
+            flight.scenario,
+            steps=2 * len(flight.t) - 1,
+            store="summary",
+            rebound=flight.settings["rebound"],
+        )
+        change = float(np.abs(finer.omega[::2] - flight.omega).max()) / abs(flight.scenario.omega0) if finer.ok else 1.0
+        coarse = f"the step is coarse: with half of it omega(t) changes by up to {change:.2g} omega_0"
+        return f"{flight.label}: {coarse}" if change > COARSE else ""
     if flight.solver != "ode_reference" or "rest_speed" not in flight.settings or not len(flight.t):
         return ""
     if seconds > SLOW:

@@ -1,11 +1,13 @@
 """The band of a run, by its twins."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import ode_reference
+import slicemodel
 from flipproof.cli.main import main
 from flipproof.frame import timing, twins
 from flipproof.frame.findings import RULES, Band, observed
@@ -57,6 +59,22 @@ def test_simulate_and_compare_say_up_to_when_a_flight_may_be_trusted(tmp_path, c
     assert "eq8: omega(t) may be trusted to 0.001 omega_0 until t = 3." in capsys.readouterr().out
     assert main(["compare", "eq8", "eq8", "--slices", "4"]) == 0
     assert "trusted" not in capsys.readouterr().out
+
+
+def test_simulate_and_compare_say_that_a_step_is_coarse(tmp_path, capsys):
+    out = ["--out", str(tmp_path / "x.csv")]
+    assert main(["simulate", "--solver", "midpoint", "--slices", "10", "--steps", "10", *out]) == 0
+    err = capsys.readouterr().err
+    change = float(
+        re.search(r"midpoint: the step is coarse: with half of it omega\(t\) changes by up to (\S+)", err)[1]
+    )
+    coarse, fine = (slicemodel.solve(Scenario().with_slices(10), "midpoint", steps).omega for steps in (10, 19))
+    assert change == pytest.approx(np.abs(fine[::2] - coarse).max() / 20.0, rel=0.05, abs=0.0)
+    assert main(["simulate", "--solver", "published-python", "--slices", "10", *out]) == 0
+    assert main(["simulate", "--solver", "published-matlab", "--slices", "10", "--steps", "10", *out]) == 1
+    assert "coarse" not in capsys.readouterr().err
+    assert "the step is coarse" in twins.doubt(slicemodel.solve(THROW, "exact-step", 20, rebound="in-step"), 0.1)
+    assert twins.doubt(slicemodel.solve(THROW, "exact-step", 20), 11.0) == ""
 
 
 def test_a_slow_flight_is_not_flown_nine_times_more_unasked():
