@@ -13,6 +13,8 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, WaitingError
+from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
+from ode_reference.switches import Switches
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -71,6 +73,14 @@ def effort_of(traits: Traits, scenario: Scenario, level: float) -> float | None:
     if traits.refined_by == "rtol":
         return max(1e-13, 1e-6 / float(10.0**level))
     return None
+
+
+def rest_speed_of(switches: Switches) -> float:
+    """Return the rest speed of the exact flights that answers are held against: one for all throws [m/s].
+
+    Solvers choose their own, often a fixed one; comparisons allow for what that changes.
+    """
+    return REST_SPEED_WITH_RECOIL if switches.recoil else REST_SPEED
 
 
 def refined_words(traits: Traits) -> str:

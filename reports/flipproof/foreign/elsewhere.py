@@ -27,11 +27,11 @@ from typing import Any, Final
 import numpy as np
 
 import ode_reference
-from flipproof.foreign.checking import THROW, CheckGenerator, NotApplicableError, Observation, effort_of
+from flipproof.foreign.checking import THROW, CheckGenerator, NotApplicableError, Observation, effort_of, rest_speed_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import name_of, placing, switches_of
-from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL, usual_rest_speed
+from ode_reference.solver import usual_rest_speed
 from ode_reference.switches import Switches
 from slicemodel import Bottle, Scenario, Trajectory
 from slicemodel.trajectory import FloatArray, Impacts
@@ -347,9 +347,7 @@ def references(equation: str, ask: Ask) -> list[Trajectory]:
     throw, times = started(ask), ask.times.tobytes()
     bottle = replace(throw.bottle, mass=throw.bottle.mass * (1 + 1e-6))
     perturbed = replace(throw, bottle=bottle, omega0=throw.omega0 * (1 + 1e-6))
-    fixed, other = REST_SPEED, 1e-3
-    if switches.recoil:
-        fixed, other = REST_SPEED_WITH_RECOIL, usual_rest_speed(switches, throw) / 10
+    fixed, other = rest_speed_of(switches), usual_rest_speed(switches, throw) / 10 if switches.recoil else 1e-3
     return [
         _reference_flight(switches, throw, times, fixed),
         _reference_flight(switches, perturbed, times, fixed),

@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 
 import ode_reference
+from flipproof.foreign.checking import rest_speed_of
 from flipproof.foreign.contract import Answer, Ask, Started, begun
 from flipproof.foreign.place import switches_of
-from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
 from slicemodel.observables import moment_of_inertia
 from slicemodel.trajectory import BASE, CAP, FloatArray
 
@@ -94,7 +94,7 @@ def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[I
     """Carry on from the state at each output to the next."""
     throw, switches = ask.scenario, switches_of(equation)
     length, spin = throw.bottle.length, abs(throw.omega0)
-    rest_speed = REST_SPEED_WITH_RECOIL if switches.recoil else REST_SPEED  # of other solvers, in any throw
+    rest_speed = rest_speed_of(switches)
     scale = {"omega": spin, "r": length, "v": length * spin}
     assert answer.r is not None
     assert answer.v is not None
