@@ -11,7 +11,7 @@ import pytest
 import ode_reference
 import slicemodel
 from flipproof.page.render import read_assets
-from slicemodel import Scenario
+from slicemodel import Bottle, Scenario
 
 SETTINGS = 40
 STEPS = 1000
@@ -47,14 +47,15 @@ def drawn_at_random():
 
 def scenario_of(thrown):
     made = Scenario(
-        water_mass=thrown["fill"], n_slices=thrown["slices"], restitution=thrown["e"], omega0=thrown["omega0"],
+        bottle=Bottle(**thrown["bottle"]), water_mass=thrown["fill"] * thrown["bottle"]["capacity"],
+        n_slices=thrown["slices"], restitution=thrown["e"], omega0=thrown["omega0"],
         theta0=thrown["theta0"], duration=thrown["duration"], gravity=thrown["g"],
     )  # fmt: skip
     return replace(made, drag=2 * made.slice_mass * thrown["gamma"])
 
 
 def apart(one, other, scenario):
-    return float(np.max(np.abs(np.asarray(one) - np.asarray(other)))) / scenario.omega0
+    return float(np.max(np.abs(np.asarray(one) - np.asarray(other)))) / abs(scenario.omega0)
 
 
 def band(scenario, model, usual):
@@ -66,7 +67,7 @@ def band(scenario, model, usual):
         rest = usual.settings["rest_speed"] * (1.0, 0.1)[k % 2]
         twin = replace(scenario, **{name: getattr(scenario, name) * change})
         flights.append(ode_reference.solve(twin, model=model, rest_speed=rest).omega)
-    return float(np.max(np.ptp(flights, axis=0))) / scenario.omega0
+    return float(np.max(np.ptp(flights, axis=0))) / abs(scenario.omega0)
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +123,96 @@ def test_the_rods_in_the_browser_are_those_of_the_reference(solved):
     assert 0 < arrivals.count(None) < SETTINGS
 
 
+FAR: dict[str, dict[str, float]] = {
+    "backwards": {"omega0": -20.0, "theta0": -0.7},
+    "strong drag": {"gamma": 200.0},
+    "long": {"duration": 3.0, "fill": 0.25, "omega0": 8.0, "gamma": 0.5, "e": 0.3},
+    "long, strong drag": {"duration": 3.0, "fill": 0.25, "omega0": 8.0, "gamma": 20.0, "e": 0.3},
+    "full, on the Moon": {"duration": 2.5, "g": 1.62, "gamma": 20.0, "fill": 1.0},
+    "heavy bottle": {"mass": 20.0},
+}
+"""Throws far from the paper's, at as many points as the page draws."""
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_throws_far_from_the_papers_are_solved_as_well(browser, name):
+    page = browser.new_page()
+    for script in ("live.js", "column.js", "rods.js"):
+        page.add_script_tag(content=str(read_assets()[script]))
+    usual = {
+        "slices": 20,
+        "duration": 0.5,
+        "g": 9.81,
+        "theta0": 1.571,
+        "fill": 0.5,
+        "gamma": 5.0,
+        "e": 0.5,
+        "omega0": 20.0,
+    }
+    thrown = usual | FAR[name]
+    thrown["bottle"] = {"length": 0.28, "radius": 0.04, "mass": thrown.get("mass", 0.028), "capacity": 1.0}
+    scenario = scenario_of(thrown)
+    models = {"eq8": "eq8", "free": "free-flight", "column": "column", "rods": "rods"}
+    for function, model in models.items():
+        curve = page.evaluate(
+            "([name, thrown]) => Array.from(flipproofLive[name](thrown, 251, null, 1))", [function, thrown]
+        )
+        expected = ode_reference.solve(scenario, model, np.linspace(0.0, scenario.duration, len(curve)))
+        assert apart(curve, expected.omega, scenario) < ADMISSIBLE.get(model, COLUMN), model
+    thrown["gamma"] = 1e7  # no step is short enough: not a number, and no wrong one
+    for function in models:
+        assert page.evaluate(
+            "([name, thrown]) => Array.from(flipproofLive[name](thrown, 251)).every(Number.isNaN)", [function, thrown]
+        ), function
+    page.close()
+
+
+@pytest.fixture
+def changed(folder, visit):
+    """Open the story as if it were of another throw."""
+
+    def opened(**thrown):
+        story = (folder / "index.html").read_text(encoding="utf-8")
+        before, tag, rest = story.partition('id="live-data">')
+        data, end, after = rest.partition("</script>")
+        (folder / "changed.html").write_text(
+            "".join((before, tag, json.dumps(json.loads(data) | thrown), end, after)), encoding="utf-8"
+        )
+        return visit(at="changed.html")
+
+    return opened
+
+
+def test_a_throw_backwards_has_the_numbers_of_its_mirror_image(changed):
+    said = []
+    for sense in (1.0, -1.0):
+        with changed(omega0=20.0 * sense, theta0=0.7 * sense) as visited:
+            visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown")
+            visited.page.get_by_test_id("gravity").click()
+            visited.page.wait_for_function("() => document.querySelector('#scene-gravity').dataset.moved")
+            proof = visited.page.locator("#scene-gravity").get_by_role("status").inner_text()
+            said.append((visited.page.get_by_test_id("live-said").inner_text(), proof))
+            assert visited.console == []
+    assert said[0] == said[1]
+    assert "Eq. 8 0 %" not in said[1][0]
+
+
+def test_a_throw_without_gravity_is_given_some(changed):
+    with changed(g=0.0) as visited:
+        visited.page.get_by_test_id("gravity").click()
+        visited.page.wait_for_function("() => document.querySelector('#scene-gravity').dataset.moved")
+        said = visited.page.locator("#scene-gravity").get_by_role("status").inner_text()
+        assert said.startswith("Gravity is on (grey: off). This moves the spin of Eq. 8 by up to ")
+        assert "up to 0 %" not in said
+
+
+def test_what_the_browser_cannot_compute_is_said_so(changed):
+    with changed(gamma=1e7) as visited:
+        visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown")
+        assert "Eq. 8 not computable" in visited.page.get_by_test_id("live-said").inner_text()
+        assert "NaN" not in visited.page.locator("main").inner_text()
+
+
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -137,7 +228,7 @@ def test_a_fault_in_the_column_is_seen(browser, right, wrong):
     page = browser.new_page()
     script = str(read_assets()["column.js"])
     assert script.count(right) == 1
-    page.add_script_tag(content="window.flipproofLive = {};" + script.replace(right, wrong))
+    page.add_script_tag(content=str(read_assets()["live.js"]) + script.replace(right, wrong))
     thrown = drawn_at_random()[1] | {"fill": 0.2 if wrong == "true;" else 0.5, "omega0": 20.0, "gamma": 5.0}
     scenario = scenario_of(thrown)
     curve = page.evaluate("thrown => Array.from(flipproofLive.column(thrown))", thrown)

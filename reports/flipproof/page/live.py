@@ -45,14 +45,15 @@ class Slider:
 
 
 def sliders(throw: Scenario) -> list[Slider]:
-    """Return the sliders of a throw, each wide enough for its value."""
+    """Return the sliders of a throw, each wide enough for its value; the spin keeps its sense, and is never zero."""
+    slowest, fastest = (5.0, 25.0) if throw.omega0 > 0 else (-25.0, -5.0)
     usual = (
         Slider("g", "gravity g", "m/s²", 0.0, 20.0, 0.01, 2, throw.gravity),
         Slider("theta0", "angle of release θ₀", "°", -180.0, 180.0, 1.0, 0, math.degrees(throw.theta0)),
         Slider("fill", "filling", "%", 10.0, 100.0, 1.0, 0, 100.0 * throw.fill_fraction),
         Slider("gamma", "drag γ", "/s", 0.0, 20.0, 0.1, 1, throw.damping_rate),
         Slider("e", "restitution e", "", 0.0, 0.8, 0.01, 2, throw.restitution),
-        Slider("omega0", "spin ω₀", "rad/s", 5.0, 25.0, 0.1, 1, throw.omega0),
+        Slider("omega0", "spin ω₀", "rad/s", slowest, fastest, 0.1, 1, throw.omega0),
     )
     return [replace(slider, low=min(slider.low, slider.value), high=max(slider.high, slider.value)) for slider in usual]
 

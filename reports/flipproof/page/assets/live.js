@@ -62,13 +62,24 @@ window.flipproofLive = (() => {
     }
   }
 
+  // In how many parts a step between two points is cut. Spin, weight and drag each want short steps [1/s]: long flights, in
+  // which errors grow, and strong drag, which pulls a light bottle along, get more. What wants more than MOST is not computed.
+  const MOST = 400;
+  const cuts = (step, ...rates) => Math.max(1, Math.ceil(step * Math.max(...rates) * (1 - 1e-9)));
+  const percent = (share) => (Number.isFinite(share) ? `${Number((100 * share).toPrecision(2))} %` : "not computable");
+
   const restSpeed = ({ omega0, bottle }) => Math.max(1e-5, 1e-3 * Math.min(1, (Math.abs(omega0) * bottle.length) / 5.6));
 
   // Omega of Eq. 8, or of free flight, at equal times. A slice slower than `rest` that its end presses on rests there;
   // in free flight `rest` is a share of the speeds in the throw.
-  // `seen` hears at each of these times the places of the slices, the angle and the centre of mass.
-  function flow(thrown, free, points = 1000, seen = null, parts = free ? 2 : 1, rest = free ? restSpeed(thrown) : 1e-5) {
-    const { n, m, M, mass, wall, y, v, inertia, momentum, gamma, g, e, theta0, duration } = prepared(thrown);
+  // `seen` hears at each of these times the places of the slices, the angle and the centre of mass. Numbers are NaN, and
+  // nothing moves, if the steps would be too short.
+  function flow(thrown, free, points = 1000, seen = null, least = free ? 2 : 1, rest = free ? restSpeed(thrown) : 1e-5) {
+    const { n, m, M, mass, wall, y, v, inertia, momentum, gamma, g, e, theta0, duration, omega0, bottle } = prepared(thrown);
+    const spinning = Math.abs(omega0), falling = free ? 0 : Math.sqrt(Math.abs(g) / bottle.length);
+    const rates = [20 * spinning * Math.max(1, (spinning * duration) / 12.5), 50 * falling * Math.max(1, (falling * duration) / 3)];
+    const wanted = Math.max(least, cuts(duration / (points - 1), ...rates, 2 * gamma * (free ? 1 + (m * n) / mass : 1)));
+    const parts = Math.min(wanted, MOST);
     const side = y.map((place) => (Math.abs(place) === wall ? Math.sign(place) : 0)), ratio = m / mass, drag = 2 * gamma;
     const rows = () => Array.from({ length: 5 }, () => new Float64Array(n)), [ys, vs, as] = [rows(), rows(), rows()];
     const omega = new Float64Array(points), y1 = ys[4], v1 = vs[4];
@@ -178,6 +189,10 @@ window.flipproofLive = (() => {
     count();
     release();
     keep(0);
+    if (wanted > MOST) {
+      for (let k = 1; k < points; k++) keep(k);
+      return omega.fill(NaN);
+    }
     for (let k = 1; k <= (points - 1) * parts; k++) {
       let left = duration / ((points - 1) * parts);
       for (let tries = 0; left > 0 && tries < 1000; tries++) {
@@ -217,5 +232,5 @@ window.flipproofLive = (() => {
     return omega;
   }
 
-  return { program, eq8: (thrown, ...how) => flow(thrown, false, ...how), free: (thrown, ...how) => flow(thrown, true, ...how) };
+  return { MOST, cuts, percent, program, eq8: (thrown, ...how) => flow(thrown, false, ...how), free: (thrown, ...how) => flow(thrown, true, ...how) };
 })();

@@ -3,8 +3,7 @@
 // Below the threshold nothing moves; above it water parts, and stays on the pile that it meets.
 window.flipproofLive.rods = (thrown, points = 1000, seen = null) => {
   const { bottle: { length, radius, mass, capacity }, fill, gamma, omega0, duration } = thrown;
-  const dt = duration / (points - 1), drag = 2 * gamma;
-  const water = fill * capacity, total = water + mass, depth = fill * length, density = water / depth;
+  const drag = 2 * gamma, water = fill * capacity, total = water + mass, depth = fill * length, density = water / depth;
   const below = ((water * depth) / 2 + (mass * length) / 2) / total, above = depth - below;
   const own = mass * (radius * radius / 2 + length * length / 12);
   const lying = (ratio) => (Math.sqrt(mass * mass + density * (mass * length + 2 * total * ratio)) - mass) / density;
@@ -38,7 +37,9 @@ window.flipproofLive.rods = (thrown, points = 1000, seen = null) => {
     return y.map((value, i) => value + (t / 6) * (k1[i] + 2 * (k2[i] + k3[i]) + k4[i]));
   };
   const room = ([grown, , z]) => z - (1 + grown) * above - piles(grown, z, false).foot + length;
-  const omega = new Float64Array(points).fill(omega0), spreads = depth < length && depth > lying(0);
+  const parts = window.flipproofLive.cuts(duration / (points - 1), 20 * Math.abs(omega0), drag * (1 + water / mass));
+  const dt = duration / (points - 1) / parts, computed = parts <= window.flipproofLive.MOST;
+  const omega = new Float64Array(points).fill(computed ? omega0 : NaN), spreads = computed && depth < length && depth > lying(0);
   let y = [0, 0, 0, 0], arrived = false;
   // `seen` hears the piles at base and cap, and where the free water between them begins and ends, from the cap.
   const keep = (k) => {
@@ -48,16 +49,16 @@ window.flipproofLive.rods = (thrown, points = 1000, seen = null) => {
   };
   keep(0);
   for (let k = 1; k < points; k++) {
-    if (!spreads) { keep(k); continue; }
-    let left = dt, next = step(y, dt, arrived);
-    if (!arrived && room(next) < 0) {
-      let [low, high] = [0, dt];
-      for (let i = 0; i < 40; i++) [low, high] = room(step(y, (low + high) / 2, false)) < 0 ? [low, (low + high) / 2] : [(low + high) / 2, high];
-      y = step(y, high, false);
-      [arrived, left] = [true, dt - high];
-      next = step(y, left, true);
+    for (let part = 0; spreads && part < parts; part++) {
+      let next = step(y, dt, arrived);
+      if (!arrived && room(next) < 0) {
+        let [low, high] = [0, dt];
+        for (let i = 0; i < 40; i++) [low, high] = room(step(y, (low + high) / 2, false)) < 0 ? [low, (low + high) / 2] : [(low + high) / 2, high];
+        arrived = true;
+        next = step(step(y, high, false), dt - high, true);
+      }
+      y = next;
     }
-    y = next;
     keep(k);
   }
   return omega;

@@ -7,7 +7,7 @@
   const COLOURS = { eq8: "eq8", free: "free-flight", rods: "rods", still: "eq8", bare: "eq8" };
   const FRAMES = 251, SLOW = 9;
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const percent = (share) => `${Number((100 * share).toPrecision(2))} %`;
+  const { percent } = live;
 
   // A flight as frames: omega, angle, centre of mass and water, both from the cap.
   function flight(solver, thrown) {
@@ -72,8 +72,9 @@
       if (!width) return;
       [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
       pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-      const wide = width / solvers.length, scale = Math.min(380, (0.4 * wide) / fixed.bottle.length), reach = 0.85 * fixed.bottle.length * scale;
-      const high = Math.max(...now.flatMap(({ omega }) => [...omega])) * 1.05, down = (value) => height - 18 - (value / high) * (CURVES - 30);
+      const wide = width / solvers.length, scale = Math.min(106, 0.4 * wide) / Math.max(fixed.bottle.length, 2 * fixed.bottle.radius), reach = 0.85 * fixed.bottle.length * scale;
+      const high = Math.max(1, ...now.flatMap(({ omega }) => [...omega].map((value) => value / thrown.omega0)).filter(Number.isFinite)) * 1.05;
+      const down = (value) => height - 18 - (value / thrown.omega0 / high) * (CURVES - 30);
       const across = (k, left) => left + 8 + (k / (FRAMES - 1)) * (wide - 22);
       solvers.forEach((solver, j) => {
         const left = j * wide, flown = now[j], colour = style(`--solver-${COLOURS[solver]}`);
@@ -103,7 +104,7 @@
         pen.fillText(NAMES[solver], left + 8, 16);
         pen.font = `12px ${getComputedStyle(canvas).fontFamily}`;
         pen.fillStyle = style("--soft");
-        const share = `${(100 * flown.omega[frame] / thrown.omega0).toFixed(0)} %`, time = `${(fixed.duration * frame / (FRAMES - 1)).toFixed(2)} s`;
+        const share = Number.isFinite(flown.omega[frame]) ? `${(100 * flown.omega[frame] / thrown.omega0).toFixed(0)} %` : percent(NaN), time = `${(fixed.duration * frame / (FRAMES - 1)).toFixed(2)} s`;
         const spin = `${time}: spin ${share}`, whole = `${spin} of the initial spin`;
         pen.fillText(pen.measureText(whole).width < wide - 22 ? whole : spin, left + 8, height - 6);
       });
@@ -122,11 +123,11 @@
     }
     function told() {
       if (!before) return;
-      const moved = now.map(({ omega }, j) => farthest(omega, before[j].omega) / thrown.omega0);
+      const moved = now.map(({ omega }, j) => Math.abs(farthest(omega, before[j].omega) / thrown.omega0));
       if (slider) said.textContent = now.map((_, j) => `${NAMES[solvers[j]]}: ω moves by up to ${percent(moved[j])} of ω₀.`).join(" ");
-      else said.textContent = thrown.g
+      else said.textContent = thrown.g === usual.g
         ? root.dataset.asked
-        : `Gravity is off (grey: on). This moves the spin of Eq. 8 by up to ${percent(moved[0])} of the initial spin, that of free flight by ${percent(moved[1])}. Gravity makes bottle and water fall together: in flight it cannot move one against the other.`;
+        : `Gravity is ${thrown.g ? "on (grey: off)" : "off (grey: on)"}. This moves the spin of Eq. 8 by up to ${percent(moved[0])} of the initial spin, that of free flight by ${percent(moved[1])}. Gravity makes bottle and water fall together: in flight it cannot move one against the other.`;
       root.dataset.moved = moved.map((share) => share.toPrecision(6)).join(" ");
     }
     function set(change) {

@@ -5,7 +5,7 @@
   if (!root) return;
   const { g, theta0, fill, gamma, e, omega0, ...fixed } = JSON.parse(document.getElementById("live-data").textContent);
   const start = { g, theta0, fill, gamma, e, omega0 }, scale = { theta0: Math.PI / 180, fill: 0.01 };
-  const chart = window.flipproofChart, { program, eq8, free, column, rods } = window.flipproofLive;
+  const chart = window.flipproofChart, live = window.flipproofLive, { program, eq8, free, column, rods } = live;
   const find = (name) => root.querySelector(`[data-testid="live-${name}"]`);
   const inputs = [...root.querySelectorAll("input")];
   const names = { "published-python": "program", eq8: "Eq. 8", "free-flight": "free flight", column: "column", rods: "rods" };
@@ -28,8 +28,8 @@
   const percent = (one, other) => {
     const at = (curve, share) => curve[Math.round(share * (curve.length - 1))], last = Math.min(one.length, other.length) - 1;
     let worst = 0;
-    for (let k = 0; k <= last; k++) worst = Math.max(worst, Math.abs(at(one, k / last) - at(other, k / last)) / thrown.omega0);
-    return `${Number((100 * worst).toPrecision(2))} %`;
+    for (let k = 0; k <= last; k++) worst = Math.max(worst, Math.abs((at(one, k / last) - at(other, k / last)) / thrown.omega0));
+    return live.percent(worst);
   };
 
   const times = new Map();
@@ -47,7 +47,7 @@
     const now = changed ? flown(thrown) : before;
     const plot = { behind: changed ? behind : [], lines: lines(now, (name) => ({ label: names[name] })) };
     const high = [...plot.behind, ...plot.lines].reduce((most, { y }) => Math.max(most, ...y.filter(Number.isFinite)), 1);
-    const y = { low: 0, high: Math.min(3, high), label: "angular velocity ω / ω₀ [1]" };
+    const y = { low: 0, high: Math.min(6, high), label: "angular velocity ω / ω₀ [1]" };
     if (touched) touched.change({ ...plot, y });
     else touched = window.flipproofTouch.touch(find("omega"), 290, { x: { low: 0, high: fixed.duration, label: "time t [s]" }, y, right: 84, ...plot });
     for (const input of inputs) {
