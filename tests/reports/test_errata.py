@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flipproof.build import ask_of
 from flipproof.chapters.errata import chapter as errata
 from flipproof.chapters.errata import equations, programs
+from flipproof.frame.solvers import REFERENCE
 from flipproof.paper import cost
 from slicemodel import Bottle, Scenario
 
@@ -136,3 +138,9 @@ def test_what_cannot_be_computed_says_so(monkeypatch):
     (item,) = errata.study_errata(THROW).values()
     assert item.verdict == "not evaluated"
     assert item.note.startswith("ScenarioError: water_mass = 2.0 kg exceeds")
+
+
+def test_what_is_printed_does_not_depend_on_the_readers_throw():
+    ask = ask_of(replace(THROW, gravity=0.0, frozen=True), "quick", certified=())
+    (audit,) = next(errata.study(ask))
+    assert audit.arguments == (REFERENCE,)

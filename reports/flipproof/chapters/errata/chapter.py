@@ -40,8 +40,8 @@ AUDIT: Final[Mapping[str, Callable[[Scenario], Erratum]]] = {
 
 
 def study(ask: Ask) -> Study[Mapping[str, Erratum]]:
-    """Have a worker audit the paper on the throw."""
-    audit = Call(study_errata, (ask.throw,), "errata")
+    """Have a worker audit the paper on its own throw: what is printed does not depend on the reader's."""
+    audit = Call(study_errata, (ask.reference,), "errata")
     flights = yield [audit]
     return cast(Mapping[str, Erratum], flights.answer(audit))
 
