@@ -16,7 +16,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.chapters.landing.throws import SPARE, Aim, Case, Scatter, Share, Z, aimed, correlation
+from flipproof.chapters.landing.throws import SPARE, Aim, Case, Scatter, Share, Z, aimed, correlation, forwards
 from flipproof.chapters.landing.work import Landed
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass_at_rest
@@ -255,7 +255,7 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
             cases |= _cut(size, Key(axis, value, last, size.axis_filling, kind), case)
     fillings, omegas = size.map_axes
     for kind, fill, omega0 in product(WATER_AND_ICE, fillings.tolist(), omegas.tolist()):
-        bottle = replace(filled(throw, fill, size.slices, KINDS[kind].frozen), omega0=omega0)
+        bottle = replace(filled(forwards(throw), fill, size.slices, KINDS[kind].frozen), omega0=omega0)
         case = replace(_case(size, standing(bottle), kind, 1, MAPPING), scatter=size.scatter.times(0.0))
         cases[Key("map", omega0, "", fill, kind)] = case
     return cases

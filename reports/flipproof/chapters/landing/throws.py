@@ -55,17 +55,26 @@ class Aim:
     rival: float = 0.0
 
 
+def forwards(throw: Scenario) -> Scenario:
+    """Return the throw, or its mirror image, which lands alike, if it spins backwards."""
+    if throw.omega0 > 0.0:
+        return throw
+    v_x, v_y = throw.launch_velocity
+    return replace(throw, omega0=-throw.omega0, theta0=-throw.theta0, launch_velocity=(-v_x, v_y))
+
+
 def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
     """Return the throw whose lowest rim is at the height of the table ``offset`` [rad] beyond the next upright angle.
 
     A bottle whose rim turns faster than the bottle falls, omega R > |v_y|, has met such a table a moment before: ice
-    of family A does.
+    of family A does. Of a throw that spins backwards, the mirror image is aimed.
 
     Raises
     ------
     ValueError
-        If no omega_0, or no time, gives that angle; or if the bottle does not turn forwards, or nothing pulls it down.
+        If no omega_0, or no time, gives that angle, or if nothing pulls the bottle down.
     """
+    throw = forwards(throw)
     if family not in FAMILIES:
         raise ValueError(f"family = {family!r} is unknown (admissible: {', '.join(FAMILIES)})")
     if throw.gravity <= 0.0:
@@ -80,8 +89,6 @@ def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
 
 
 def _by_height(throw: Scenario, goal: float) -> Aim:
-    if not throw.omega0 > 0.0:
-        raise ValueError(f"omega0 = {throw.omega0:g} rad/s is outside (0, inf): the aim is a turn forwards")
     t, theta, rim = turn(replace(throw, duration=LONGEST), 1e-3)
     reached = np.flatnonzero(theta >= goal)
     if not reached.size:
