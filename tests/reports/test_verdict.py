@@ -10,7 +10,7 @@ from typing import get_args
 
 import pytest
 
-from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL
+from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, FORMULAS, PROGRAM_EQ8, TOTAL
 from flipproof.chapters.differences.study import percent
 from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, WAYS
 from flipproof.chapters.waterfall.study import STEP
@@ -20,7 +20,7 @@ from flipproof.page.verdict import Headline, Measure, answer, headlines, lead, l
 
 INSTEAD = "For slices, use free flight; for water, half full or more, rods (slices without overlap) are the best guess."
 
-PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
+PAIRS = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "formulas": FORMULAS, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def test_a_fresh_reports_numbers_are_those_of_its_differences_and_findings(repor
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("id_", ["whole", "program-eq8", "eq8-free", "pair", "share", "held", "step"])
+@pytest.mark.parametrize("id_", ["whole", "program-eq8", "formulas", "eq8-free", "pair", "share", "held", "step"])
 def test_every_number_stands_at_two_numbers_of_slices(kept, id_):
     headline = of(kept)[id_]
     assert headline.finer_slices == FINER * headline.slices
@@ -188,36 +188,32 @@ def test_nothing_is_said_of_ice_or_of_nothing():
     assert lead([]).startswith("No verdict")
 
 
-@pytest.mark.parametrize(
-    ("step", "equation", "short", "free"),
-    [
-        (0.005, 0.55, True, False),
-        (0.01, 0.01, True, True),
-        (0.02, 0.001, False, True),
-        (0.02, 0.55, False, False),
-        (math.nan, math.nan, False, False),
-    ],
-)
-def test_the_answer_follows_from_step_and_equation(step, equation, short, free):
-    words = answer([made_up("step", step), made_up("eq8-free", equation)])
-    assert ("steps are short enough" in words, "steps are too long" in words) == (short, not short)
-    assert ("is free flight within 1 %" in words, "is not free flight" in words) == (free, not free)
-    assert words.startswith("Not as it stands") is (short and not free)
-    assert words.endswith(INSTEAD) != free
-    assert answer([made_up("step", step)]).startswith("No verdict")
+@pytest.mark.parametrize("weight", [True, False])
+@pytest.mark.parametrize("formulas", [0.42, 0.01, None])
+@pytest.mark.parametrize("equation", [0.55, 0.01, math.nan])
+@pytest.mark.parametrize("step", [0.02, 0.01, math.nan])
+def test_the_answer_names_each_of_three_faults_and_no_other(step, equation, formulas, weight):
+    found = [made_up("step", step), made_up("eq8-free", equation)]
+    found += [made_up("formulas", formulas)] if formulas else []
+    words = answer([*found, made_up("pair", 0.55, what="gravity in Eq. 8" if weight else "no recoil in impacts")])
+    free, short, solved = equation <= 0.01, step <= 0.01, (formulas or 0.0) <= 0.01
+    assert ("is free flight within 1 %" in words) is free
+    assert ("gravity slide water" in words) is (weight and not free)
+    assert ("is not free flight" in words) is not (weight or free)
+    assert ("time step alone moves ω" in words) is not short
+    assert ("by up to 2 % of ω₀" in words) is (step == 0.02)
+    assert ("than can be computed" in words) is math.isnan(step)
+    assert ("solves another equation" in words or "its formulas are not Eq. 8" in words) is not solved
+    assert ("steps are short enough" in words) is (short and solved)
+    assert words.startswith("Not as it stands") is (short and not (free and solved))
+    assert words.endswith(INSTEAD) is not free
+
+
+def test_the_answer_needs_step_and_equation():
+    assert answer([made_up("step", 0.005)]).startswith("No verdict")
     assert answer([]).startswith("No verdict")
-
-
-@pytest.mark.parametrize(
-    ("algebra", "largest"),
-    [(0.42, "gravity in Eq. 8"), (0.42, "no recoil in impacts"), (0.01, "gravity in Eq. 8")],
-)
-def test_the_answer_names_the_algebra_and_the_weight_where_they_matter(algebra, largest):
-    found = [made_up("step", 0.005), made_up("eq8-free", 0.55), made_up("program-eq8", algebra)]
-    words = answer([*found, made_up("pair", 0.55, what=largest)])
-    assert ("gravity slide water" in words) is (largest == "gravity in Eq. 8")
-    assert ("program solves another equation" in words) is (algebra > 0.01)
-    assert ("time steps are short enough" in words) is (algebra <= 0.01)
+    ice = [made_up(id_, 1e-13) for id_ in ("step", "eq8-free", "whole", "pair")]
+    assert answer(ice).startswith("This throw tells nothing apart")
 
 
 # ---------------------------------------------------------------------- the finite step

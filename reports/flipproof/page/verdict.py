@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from types import SimpleNamespace
@@ -28,7 +29,7 @@ from markupsafe import Markup
 
 from engine_check.engines import ENGINES
 from flipproof.chapters.agreement.chapter import UP_TO
-from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, PROGRAM_EQ8, TOTAL, Differences
+from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, FORMULAS, PROGRAM_EQ8, TOTAL, Differences
 from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.chapters.finite_step.chapter import EVERYTHING, LOCATED, StepCosts
 from flipproof.chapters.maps.study import RUNGS, SLICES, place_of
@@ -107,7 +108,13 @@ def headlines(gathered: Gathered) -> tuple[Headline, ...]:
 def _pairs(differences: Differences) -> Iterator[Headline]:
     named = {difference.name: difference for difference in differences.pairs}
     rungs = [named[name] for name in RUNG_NAMES.values() if name in named]
-    wanted = {"whole": TOTAL, "program-eq8": PROGRAM_EQ8, "eq8-free": EQ8_FREE, "engine": BY_ENGINE}
+    wanted = {
+        "whole": TOTAL,
+        "program-eq8": PROGRAM_EQ8,
+        "formulas": FORMULAS,
+        "eq8-free": EQ8_FREE,
+        "engine": BY_ENGINE,
+    }
     chosen = {id_: named[name] for id_, name in wanted.items() if name in named}
     if rungs:
         chosen["pair"] = max(rungs, key=lambda difference: difference.largest)
@@ -167,33 +174,43 @@ def _steps(study: StepCosts) -> Iterator[Headline]:
 def answer(headlines: Sequence[Headline]) -> str:
     """Return the verdict in short: physics, algebra and step; and which equation to take instead.
 
-    Each holds if no curve of omega moves by more than PARTING_BAND of omega_0; weight is named if no other rung of the
-    ladder moves it further.
+    Each holds if no curve of omega moves by more than PARTING_BAND of omega_0, NaN fails; weight is named if no other
+    rung of the ladder moves it further.
     """
     by_id = {headline.id: headline for headline in headlines}
     if not {"step", "eq8-free"} <= set(by_id):
         return "No verdict: what it needs could not be computed. The evidence gives the reasons."
-    within = percent(PARTING_BAND)
-    weight = "pair" in by_id and by_id["pair"].what == RUNG_NAMES["weightless"]
-    solved = "program-eq8" not in by_id or by_id["program-eq8"].value <= PARTING_BAND
-    physics = "Eq. 8 lets gravity slide water along the bottle" if weight else "Eq. 8 is not free flight"
+    if not _differ(by_id):
+        return f"This throw tells nothing apart: all equations agree within {small(NOTHING)} of ω₀, as for ice."
+    fails = {id_: not headline.value <= PARTING_BAND for id_, headline in by_id.items()}
+    formulas = fails.get("formulas", False)
+    physics = "Eq. 8 is not free flight"
+    if "pair" in by_id and by_id["pair"].what == RUNG_NAMES["weightless"]:
+        physics = "Eq. 8 lets gravity slide water along the bottle"
+    if not fails["eq8-free"]:
+        physics = f"Eq. 8 is free flight within {percent(PARTING_BAND)} of ω₀"
+    instead = (
+        " For slices, use free flight; for water, half full or more, rods (slices without overlap) are the best guess."
+    )
+    if fails["step"]:
+        moved = by_id["step"].value
+        size = f"up to {percent(moved)} of ω₀" if math.isfinite(moved) else "more than can be computed"
+        step = f"On this throw the program’s time step alone moves ω by {size}"
+        step += ", and its formulas are not Eq. 8." if formulas else "."
+        return f"{step} {physics}.{instead if fails['eq8-free'] else ''}"
+    if not fails["eq8-free"] and not formulas:
+        return f"On this throw the steps are short enough. {physics}."
     other_equation = "the paper’s program solves another equation; shorter time steps would not help"
-    program = ". The program’s time steps are short enough" if solved else f", and {other_equation}"
-    water = "for water, half full or more, rods (slices without overlap) are the best guess."
-    instead = f"For slices, use free flight; {water}"
-    return {
-        (True, False): f"Not as it stands: {physics}{program}. {instead}",
-        (True, True): f"On this throw the steps are short enough. Eq. 8 is free flight within {within} of ω₀.",
-        (False, True): f"On this throw the steps are too long. Eq. 8 is free flight within {within} of ω₀.",
-        (False, False): f"On this throw the steps are too long, and Eq. 8 is not free flight. {instead}",
-    }[by_id["step"].value <= PARTING_BAND, by_id["eq8-free"].value <= PARTING_BAND]
+    if not fails["eq8-free"]:
+        return f"Not as it stands: {other_equation}. {physics}."
+    program = f", and {other_equation}" if formulas else ". The program’s time steps are short enough"
+    return f"Not as it stands: {physics}{program}.{instead}"
 
 
 def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
     """Yield five questions with their answers, each one sentence; fewer if numbers are missing, none if all agree."""
     by_id = {headline.id: headline for headline in headlines}
-    values = [by_id[id_].value for id_ in ("whole", "program-eq8", "pair") if id_ in by_id]
-    if values and max(values) < NOTHING:
+    if not _differ(by_id):
         return
     steps = by_id["step"].note if "step" in by_id else "the steps"
     also = f", but only {_amount(by_id['whole'])} off free flight" if _nearer_to_free(by_id) else ""
@@ -211,6 +228,12 @@ def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
             hidden = _hidden(headline)
             yes = f"Yes{', as far as they can tell' if hidden else ''}" if headline.value <= PARTING_BAND else "No"
             yield question, f"{yes}: up to {words.format(_amount(headline))}{hidden}{until}."
+
+
+def _differ(by_id: Mapping[str, Headline]) -> bool:
+    """Return whether any two solvers of the ladder differ at all."""
+    values = [by_id[id_].value for id_ in ("whole", "program-eq8", "pair") if id_ in by_id]
+    return not values or not max(values) < NOTHING
 
 
 def _nearer_to_free(by_id: Mapping[str, Headline]) -> bool:
@@ -283,6 +306,7 @@ CHANGES: Final[Mapping[str, str]] = {
 SHARES: Final[Mapping[str, str]] = {
     "step": "headlines/step/value",
     "program_eq8": "headlines/program-eq8/value",
+    "formulas": "headlines/formulas/value",
     "eq8_free": "headlines/eq8-free/value",
     "whole": "headlines/whole/value",
     "engine": "headlines/engine/value",
@@ -367,7 +391,7 @@ def _layers(summary: Summary, numbers: Mapping[str, Number | None]) -> list[Simp
     steps = summary.at("headlines/step/note") or "the steps"
     questions = {
         "step": ("The time step", "steps", f"Are {steps} enough?"),
-        "program-eq8": (
+        "formulas": (
             "The formulas of the program",
             "errata",
             "Do the program’s formulas, meant to be Eq. 9, solve Eq. 8?",
@@ -421,6 +445,7 @@ def _water(summary: Summary) -> SimpleNamespace | None:
     numbers = {name: summary.number(source, percent) for name, source in WATER.items()}
     for name, solver in (("rods", "rods"), ("free", "free-flight")):
         numbers[f"{name}_off"] = summary.number(f"findings/water-{solver}/value", small)
+    numbers["slices"] = summary.number("water/slices", plain)
     return SimpleNamespace(**numbers) if all(numbers.values()) else None
 
 

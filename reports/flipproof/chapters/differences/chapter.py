@@ -44,6 +44,7 @@ from slicemodel import Trajectory
 
 TOTAL: Final = "published program to free flight"
 BY_ENGINE: Final = "free flight, event-driven and by an engine"
+FORMULAS: Final = "equation of the published program to Eq. 8"
 PROGRAM_EQ8: Final = "published program to Eq. 8"
 EQ8_FREE: Final = "Eq. 8 to free flight"
 
@@ -71,6 +72,7 @@ PAIRS: Final = (
         (BY_ENGINE if name == ENGINE else f"{spoken(engine.model)}, event-driven and by {name}", engine.model, name)
         for name, engine in ENGINES.items()
     ),
+    (FORMULAS, LIMITS["published-python"], "eq8"),
     (PROGRAM_EQ8, "published-python", "eq8"),
     (EQ8_FREE, "eq8", FREE),
     (TOTAL, "published-python", FREE),
@@ -78,7 +80,7 @@ PAIRS: Final = (
 """Name, first, second: down the ladder one assumption at a time, then the engines, then several together."""
 
 AXIS_MIN, AXIS_MAX = 1e-6, 2.0
-"""Ends of the axis of the figure, as shares of omega_0."""
+"""Ends of the axis of the figure, as shares of omega_0; it ends higher where a difference is larger."""
 
 
 class Differences(NamedTuple):
@@ -203,8 +205,8 @@ def _id(first: str, second: str) -> str:
 
 
 def figures(results: Differences) -> Iterator[Exhibit]:
-    """Yield the differences over time."""
-    if not results.pairs:
+    """Yield the differences over time; nothing of ice, in which there are none."""
+    if not any(d.largest > AXIS_MIN / 10 for d in results.pairs):
         return
     curves = {d.name: (d.t, d.omega) for d in results.pairs}
     words = "; ".join(f"{d.name}: at most {d.largest:.2g} of omega_0, {d.moment}" for d in results.pairs)
@@ -223,10 +225,16 @@ def figures(results: Differences) -> Iterator[Exhibit]:
             label="|difference in ω| / ω₀ [1]",
             curves=curves,
             shown=(PROGRAM_EQ8, EQ8_FREE, TOTAL),
-            limits=(AXIS_MIN, AXIS_MAX),
+            limits=(AXIS_MIN, axis_end(results.pairs)),
             beside=True,
         ),
     )
+
+
+def axis_end(differences: Sequence[Difference]) -> float:
+    """Return where the axis of differences ends, a share of omega_0."""
+    largest = [d.largest for d in differences if np.isfinite(d.largest)]
+    return max(AXIS_MAX, 1.5 * max(largest, default=0.0))
 
 
 @styled
@@ -242,7 +250,7 @@ def draw(differences: Sequence[Difference]) -> Figure:
         words = f"{textwrap.fill(difference.name, 32)}\nat most {percent(difference.largest)}"
         axes.set_title(words, fontsize=9, loc="left")
         axes.margins(x=0.02)
-    panels[0].set(yscale="log", ylim=(AXIS_MIN, AXIS_MAX))
+    panels[0].set(yscale="log", ylim=(AXIS_MIN, axis_end(differences)))
     return figure
 
 
