@@ -1,6 +1,8 @@
 """Throws that no regression claim was written for: their reports must be whole all the same."""
 
+import html
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -34,6 +36,16 @@ UNUSUAL = {
 }
 
 
+SAYS = {
+    "ice": ("The throw of this report is ice.", "This throw tells nothing apart", "kg of ice"),
+    "one slice": ("N = 1 slice;", "It does so with rods."),
+    "all of these": ("Switch gravity on:", "This throw has no gravity."),
+}
+"""What the story has to say of some of them."""
+
+NOT_OF_ICE = {"differences", "frozen", "overlap", "step-size", "waterfall"}
+"""Figures that have nothing to show if nothing moves."""
+
 TOGETHER = ("weightless, other spin", "elastic", "full")
 """What a push throws together, and alone only among the long forms."""
 
@@ -46,7 +58,8 @@ def test_unusual_throws_have_a_report_too(name, read_page):
     """No failed regression, no warning, no NaN in the page: a regression claim is not the user's throw to break."""
     values = {"n_slices": 8, "drag": 0.5} | UNUSUAL[name]
     reference = replace(Scenario().with_slices(10), duration=0.3)
-    ask = replace(ask_of(Scenario(**values), "quick", certified=()), reference=reference)
+    scenario = Scenario(**values)
+    ask = replace(ask_of(scenario, "quick", certified=()), reference=reference)
     contents = tuple(replace(p, chapters=tuple(c for c in p.chapters if c.name not in WITHOUT)) for p in parts())
     # In this process: to start workers for it, twice, takes a third of the time of all of it.
     gathered = gather_report(ask, work=SMALL, pool=SerialExecutor(), contents=contents)
@@ -55,3 +68,6 @@ def test_unusual_throws_have_a_report_too(name, read_page):
     json.dumps(report.summary, allow_nan=False)
     for page in report.pages.values():
         read_page(page)
+    story = " ".join(re.sub(r"<[^>]*>", "", html.unescape(report.pages["index.html"])).replace("\xa0", " ").split())
+    assert [words for words in SAYS.get(name, ()) if words not in story] == []
+    assert bool(NOT_OF_ICE & {exhibit.name for exhibit in report.exhibits}) is not scenario.frozen

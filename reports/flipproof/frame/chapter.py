@@ -86,6 +86,7 @@ class Chapter(Generic[F]):
     study : generator that yields runs and calls, and returns what was found
     template : file of the chapter's part of the page; None: ``part.html.j2`` beside it, or its figures alone
     work : size of a report -> amount of work that the study is asked for; a size that is missing leaves the chapter out
+    ice : whether there is anything to see if nothing moves in the bottle; if not, a report of ice has no such chapter
     kind : what it is if the study cannot be made at all; a regression fails the report
     summary : entries of ``summary.json``
     tables : path in the report folder -> text of a file
@@ -100,6 +101,7 @@ class Chapter(Generic[F]):
     _: KW_ONLY
     template: Path | None = None
     work: Mapping[Size, Any] = field(default_factory=lambda: {"quick": None, "full": None})
+    ice: bool = True
     kind: Kind = "observation"
     summary: Callable[[F], Mapping[str, Any]] = lambda _: {}
     tables: Callable[[F], Mapping[str, str]] = lambda _: {}

@@ -90,7 +90,7 @@ def gather(
     outcomes: dict[str, Outcome[Any]] = {}
     waiting: dict[str, tuple[Any, tuple[Run | Call, ...]]] = {}
     for chapter in (chapter for part in parts for chapter in part.chapters):
-        if ask.size in chapter.work or chapter.name in work:
+        if (ask.size in chapter.work or chapter.name in work) and (chapter.ice or not ask.throw.frozen):
             amount = work.get(chapter.name, chapter.work.get(ask.size))
             _advance(chapter.name, chapter.study(replace(ask, work=amount)), None, waiting, outcomes)
     wave = 0

@@ -238,4 +238,4 @@ def _shown(values: FloatArray) -> FloatArray:
     return np.where(values > 0, values, np.nan)
 
 
-CHAPTER: Final = Chapter("frozen", "ω held constant over a step", study, figures=figures)
+CHAPTER: Final = Chapter("frozen", "ω held constant over a step", study, figures=figures, ice=False)

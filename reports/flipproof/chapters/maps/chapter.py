@@ -240,7 +240,8 @@ def figure_map(study: ValidityMap) -> Figure:
     reasons = _reasons(study)
     if reasons:
         handles.append(Patch(label=f"not computed: {reasons}", **hatched))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3 if longest < 38 else 2)
     return figure
 
 
@@ -334,5 +335,5 @@ def _reasons(study: ValidityMap) -> str:
 
 
 CHAPTER: Final = Chapter(
-    "maps", "For which bottles", study, claims, figures, work={"full": 15}, page=lambda _: {"slices": SLICES}
+    "maps", "For which bottles", study, claims, figures, ice=False, work={"full": 15}, page=lambda _: {"slices": SLICES}
 )

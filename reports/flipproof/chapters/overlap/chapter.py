@@ -173,6 +173,8 @@ def figures(result: OverlapResult) -> Iterator[Exhibit]:
             columns[f"band {name} [1]"] = study.band
         if any(study.reason[name]):
             columns[f"missing because: {name}"] = study.reason[name]
+    lost = study.missing_from_ice(EXCLUDE)
+    kept = "" if np.isnan(lost) else f"In the same engine, slices that exclude each other keep {1 - lost:.1%} of it. "
     cost, max_note = study.cost_to_column, ""
     if np.isfinite(cost).any():
         k = int(np.nanargmax(np.abs(cost)))
@@ -182,10 +184,9 @@ def figures(result: OverlapResult) -> Iterator[Exhibit]:
         name="overlap",
         title="How far ω falls because slices may overlap",
         caption="In the paper slices pass through each other, and a full bottle, which ought to behave like ice, slows "
-        "down. In the same engine, slices that exclude each other keep the angular velocity of a full "
-        "bottle. The two curves differ by the effect of overlap. Water as one stretching column cannot overlap either, "
-        "and has no free parameter. Free flight minus the column is a difference of two exactly solved models (free "
-        f"flight at N = {study.throw.n_slices}) and not a share{max_note}. Rods "
+        f"down. {kept}The two curves differ by the effect of overlap. Water as one stretching column cannot overlap "
+        "either, and has no free parameter. Free flight minus the column is a difference of two exactly solved models "
+        f"(free flight at N = {study.throw.n_slices}) and not a share{max_note}. Rods "
         "are infinitely many slices that exclude each other and do not bounce. In the "
         "paper's experiment the fall is largest at fillings of 0.25 to 0.5, and a filling of 0.1 turns like ice. Bars: "
         "twice what halving the step changes.",
@@ -238,6 +239,7 @@ CHAPTER: Final = Chapter(
     title="How far ω falls because slices may overlap",
     study=study,
     claims=claims,
+    ice=False,
     kind="regression",
     figures=figures,
     work={"quick": Amount((0.5, 1.0), 6, 2e-4), "full": Amount()},

@@ -256,7 +256,8 @@ def figures(panels: Sequence[Panel]) -> Iterator[Exhibit]:
     default = [grade for panel in panels for grade in panel.at_default]
     missing = sorted({cell.reason for panel in panels for cell in panel.cells.values() if cell.grade == "not run"})
     caption = (
-        f"Every cell is a flight of {panels[0].layout.duration:g} s, held against event-driven free flight; its sign "
+        f"Every cell is a flight of {panels[0].layout.duration:g} s in the paper's throw, cut and filled anew, held "
+        "against event-driven free flight; its sign "
         f"says the same as its colour. Of the {len(default)} flights with pymunk's own {DEFAULT_ITERATIONS} "
         f"iterations (dashed) {default.count('explodes')} explode; their times from left to right show whether a "
         "finer step helps. Where a column reads the same from some row upwards, more iterations no longer change "

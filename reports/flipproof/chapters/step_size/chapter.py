@@ -209,6 +209,9 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
     """The scheme converges to its equation at first order, every refinement being better than the one before."""
     id_ = f"order-{study.scheme}-{where.replace(' ', '-')}"
     title = f"{study.scheme} converges to {study.model} at order 1, {where}"
+    if kind == "observation":
+        part = "before the first impact" if where == START else "whole flight"
+        title = f"observed order of {study.scheme} towards {study.model}, this throw, {part}"
     if study.exact:
         note = "there is no step error to be seen: all errors are at round-off"
         return observed(id_, title, float(study.error.max()), "of ω₀", note)
@@ -226,7 +229,7 @@ def claim_order(study: StepSize, where: str, *, kind: Kind = "regression") -> Fi
 def figures(results: Orders) -> Iterator[Exhibit]:
     """Yield error against step size, over the whole flight and before the first impact."""
     studies, starts = _measured(results, WHOLE), _measured(results, START)
-    if not studies:
+    if all(study.exact for study in studies):
         return
     words = f"Over the whole flight: {'; '.join(map(_converges, studies))}."
     if starts:
@@ -256,11 +259,14 @@ def figures(results: Orders) -> Iterator[Exhibit]:
 def _converges(study: StepSize) -> str:
     if study.exact:
         return f"{study.scheme} equals {study.model} to round-off at every step"
-    order = f"order {study.order:.2f}" if math.isfinite(study.order) else "no order"
     return (
-        f"{study.scheme} to {study.model} {order}, error {study.mean_error[0]:.1e} of omega_0 at a step of "
+        f"{study.scheme} to {study.model} {_order(study)}, error {study.mean_error[0]:.1e} of omega_0 at a step of "
         f"{study.mean_dt[0]:.1e} s down to {study.mean_error[-1]:.1e} at {study.mean_dt[-1]:.1e} s"
     )
+
+
+def _order(study: StepSize) -> str:
+    return f"order {study.order:.2f}" if math.isfinite(study.order) else "no order"
 
 
 @styled
@@ -275,7 +281,7 @@ def figure_step_size(flights: Sequence[StepSize], starts: Sequence[StepSize]) ->
             axes.fill_between(study.mean_dt, low, high, color=style["color"], alpha=0.25, linewidth=0)
             look = {"color": style["color"], "linewidth": 1.4, "label": f"{study.scheme} → {study.model}"}
             axes.loglog(study.mean_dt, np.maximum(study.mean_error, ROUND_OFF), marker=MARKERS[k], **look)
-            words, colour = f"{study.scheme}: order {study.order:.2f}", STYLES.get(study.model, style)["color"]
+            words, colour = f"{study.scheme}: {_order(study)}", STYLES.get(study.model, style)["color"]
             axes.text(0.03, 0.96 - 0.07 * k, words, transform=axes.transAxes, va="top", fontsize=9, color=colour)
         if studies:
             dt = studies[0].mean_dt

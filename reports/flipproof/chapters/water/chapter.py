@@ -202,7 +202,7 @@ def figure_water(water: Water) -> Figure:
 
 
 def summary(water: Water) -> dict[str, Any]:
-    """Return the plateaus and what each misses, by equation and filling, and the band of all fluids."""
+    """Return the plateaus and what each misses, by equation and filling, the band of all fluids, and N."""
     wanted = fluids()["fillings"]
     rows = [
         {
@@ -220,7 +220,7 @@ def summary(water: Water) -> dict[str, Any]:
         for name in EQUATIONS
     ]
     bands = [{"id": f"{f:g}", "low": float(a), "high": float(b)} for f, a, b in zip(*fluid_band(), strict=True)]
-    return {"water": {"equations": rows, "fluids": bands}}
+    return {"water": {"slices": water.slices, "equations": rows, "fluids": bands}}
 
 
 CHAPTER: Final = Chapter(

@@ -164,5 +164,5 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
 
 
 CHAPTER: Final = Chapter(
-    "waterfall", "What each assumption costs", study, claims, figures, work={"quick": 50, "full": 50}
+    "waterfall", "What each assumption costs", study, claims, figures, ice=False, work={"quick": 50, "full": 50}
 )
