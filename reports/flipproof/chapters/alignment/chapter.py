@@ -203,7 +203,7 @@ def even_rows(n_slices: int) -> list[int]:
 def figure_gantt(alignment: Alignment) -> Figure:
     """Contacts and impacts of two runs, one row per slice: the first run above, the second paler below."""
     rows = {i: row for row, i in enumerate(even_rows(alignment.n_slices))}
-    figure, axes = new_figure(size=(8.0, 1.9 + 0.36 * len(rows)))
+    figure, axes = new_figure(size=(8.0, 1.9 + 0.36 * max(len(rows), 5)))
     axes.grid(visible=False)
     for row in range(1, len(rows), 2):
         axes.axhspan(row - 0.5, row + 0.5, color="#f4f4f4", linewidth=0)
