@@ -139,6 +139,12 @@ def _impact_cause(intervals: Sequence[Interval], *, recoil: bool) -> str:
         )
     if other_error < 0.05 * own_error:
         return f"{_restitution_cause(single)}, and the others are right"
+    stays = [i.speeds[0] for i in single if not i.v[1][i.hits[0][0]] and not i.after[i.hits[0][0]]]
+    if len(stays) > 0.6 * len(single):
+        return (
+            f"the slice that strikes, at up to {max(stays):.2g} m/s, rests from then on: look at the speed below which "
+            "a slice rests"
+        )
     if not recoil:
         return "the slice that strikes and the others are off, which no impact of this equation moves"
     if cause := _common_restitution(single):

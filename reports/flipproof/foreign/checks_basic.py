@@ -90,7 +90,13 @@ def check_start(traits: Traits) -> CheckGenerator:
         (closer,) = yield [replace(ask, times=ask.times / 10)]
         if abs(abs(closer.omega[0] / throw.omega0 - 1.0) / errors["omega"] - 1.0) < 0.1:  # no slope: it would be nearer
             from_slope = False
-            hint = "omega(0) is off by as much at any times asked: J_0 in J_0 omega_0 is not the J of the start"
+            wrong = "J_0 in J_0 omega_0 is not the J of the start"
+            if (
+                answer.inertia is not None
+                and not abs(answer.inertia[0] / float(moment_of_inertia(throw, ask.start)) - 1.0) <= bound
+            ):
+                wrong = "J_0 omega_0 is divided by a J that is not that of the start, as the answered inertia shows"
+            hint = f"omega(0) is off by as much at any times asked: {wrong}"
     turns = (answer.theta[0] - throw.theta0) / (2 * np.pi)
     if worst == "theta" and round(turns) and abs(turns - round(turns)) < 1e-6:
         hint = "theta is off by whole turns: do not wrap it"

@@ -211,8 +211,9 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         )
     else:
         default_advice = (
-            "a coefficient of the step or its Jacobian, slopes that are remembered and how a step begins without them, "
-            "the instant at which omega, r_CM or J are taken, or how a step is cut to a time asked, costs the order"
+            "a coefficient of the step or its Jacobian, an iteration that ends early, slopes that are remembered and "
+            "how a step begins without them, the instant at which omega, r_CM or J are taken, or how a step is cut to "
+            "a time asked, costs the order"
         )
     return Observation(
         holds=holds,

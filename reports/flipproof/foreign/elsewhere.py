@@ -649,7 +649,7 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
         observed = f"at most {largest:.2g} of omega_0 off, its own error {own_error:.2g}"
         return Observation(holds=True, expected=expected, observed=observed, weak=weak_text, facts=facts)
     observed, impacts, advice = yield from bisected(traits, *wrong[0], seed, equation, unrefined)
-    if not (wrong[0][0].frozen or wrong[0][1].error):
+    if not (wrong[0][0].frozen or wrong[0][1].error or set(wrong[0][1].wrong) == {"v"}):
         with suppress(ForeignError, NotApplicableError):
             departure, cause = yield from departing(traits, equation, [wrong[0][0].ask(seed)])
             if departure:  # more exact than the impact after which the whole flight is first wrong
@@ -875,4 +875,5 @@ def _field_advice(comparison: Comparison, prefix: str = "", *, ice: bool = False
     ):
         return ""
     fields = ", ".join(comparison.wrong)
-    return f"{prefix}omega is right, {fields} not: look at how the answer is put together"
+    closer = ", and at sign, unit and instant of v" if fields == "v" else ""
+    return f"{prefix}omega is right, {fields} not: look at how the answer is put together{closer}"
