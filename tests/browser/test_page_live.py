@@ -167,6 +167,21 @@ def test_throws_far_from_the_papers_are_solved_as_well(browser, name):
     page.close()
 
 
+@pytest.mark.parametrize(("low", "high"), [(20.0, 20.0 + 4e-15), (0.0, 0.0), (-1e-320, 1e-320), (-3.0, 5.0)])
+def test_an_axis_of_any_range_is_drawn(browser, low, high):
+    page = browser.new_page()
+    page.add_script_tag(content=str(read_assets()["chart.js"]))
+    marks = page.evaluate(
+        "([low, high]) => { const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');"
+        "document.body.append(svg);"
+        "flipproofChart.draw(svg, 200, {x: {low: 0, high: 1, label: 't'}, y: {low, high, label: 'y'}, lines: []});"
+        "return svg.querySelectorAll('.chart-grid').length; }",
+        [low, high],
+    )
+    page.close()
+    assert marks < 30
+
+
 @pytest.fixture
 def changed(folder, visit):
     """Open the story as if it were of another throw."""

@@ -46,3 +46,8 @@ def test_a_constant_curve_has_an_axis():
     data = touch_data(Touch(label="ω [1]", curves={"ice": (T[:1], np.ones(1))}))
     assert data["y"]["low"] < 1.0 < data["y"]["high"]
     assert read(data, "ice")[1] == pytest.approx([1.0])
+
+
+def test_what_differs_by_round_off_alone_is_level():
+    data = touch_data(Touch(label="ω [rad/s]", curves={"ice": (T, 20.0 + 4e-15 * np.sin(40 * T))}))
+    assert data["y"]["high"] - data["y"]["low"] > 1.0

@@ -271,7 +271,9 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
     for finding in report.findings:
         if finding.id.startswith("difference-"):
             size = "       –" if finding.value is None else f"{finding.value:8.3%}"
-            print(f"  {size}  {finding.title}")
+            band = finding.band.size if finding.band is not None else 0.0
+            vague = f" (numerical uncertainty {100 * band:.2g}%)" if band > 0.1 * (finding.value or 0.0) > 1e-6 else ""
+            print(f"  {size}  {finding.title}{vague}")
     regressions = [finding for finding in report.findings if finding.kind == "regression"]
     for finding in report.failed:
         print(f"FAIL  {finding.title}: {finding.value_text} (threshold {finding.threshold_text}) {finding.note}")
@@ -279,6 +281,9 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
         if finding.id.startswith("measured-fit-"):
             print(f"{finding.title}: {finding.value_text} root mean square")
     page = out / "index.html"
+    absent = [finding.title for finding in report.findings if finding.kind == "observation" and finding.value is None]
+    if absent:
+        print(f"Not observed, for reasons in the evidence: {'; '.join(absent)}")
     print(f"{len(regressions) - len(report.failed)} of {len(regressions)} regression claims hold.")
     print(f"Report: {page} ({seconds:.0f} s)")
     print(answer([Headline.from_mapping(mapping) for mapping in report.summary.get("headlines", ())]))

@@ -83,7 +83,8 @@ def touch_data(touch: Touch) -> dict[str, Any]:
         values = {name: np.log10(np.maximum(np.abs(curve), floor)) for name, curve in values.items()}
     finite = np.concatenate([curve[np.isfinite(curve)] for curve in values.values()])
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
-    room = 0.04 * (high - low) or 1.0
+    size = max(abs(low), abs(high))
+    room = 0.04 * (high - low if high - low > 1e-9 * size else size) or 1.0  # what differs by round-off alone is level
     y: dict[str, Any] = {"label": touch.label, "digits": touch.digits, "high": high + room}
     y["low"] = 0.0 if 0.0 <= low < 0.5 * high else low - room
     if touch.limits is not None:

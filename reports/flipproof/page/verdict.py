@@ -107,7 +107,8 @@ def headlines(gathered: Gathered) -> tuple[Headline, ...]:
 
 def _pairs(differences: Differences) -> Iterator[Headline]:
     named = {difference.name: difference for difference in differences.pairs}
-    rungs = [named[name] for name in RUNG_NAMES.values() if name in named]
+    after_eq8 = (RUNG_NAMES[switch] for switch in ("weightless", "origin", "recoil"))
+    rungs = [named[name] for name in after_eq8 if name in named]
     wanted = {
         "whole": TOTAL,
         "program-eq8": PROGRAM_EQ8,
@@ -175,7 +176,7 @@ def answer(headlines: Sequence[Headline]) -> str:
     """Return the verdict in short: physics, algebra and step; and which equation to take instead.
 
     Each holds if no curve of omega moves by more than PARTING_BAND of omega_0, NaN fails; weight is named if no other
-    rung of the ladder moves it further.
+    rung from Eq. 8 to free flight moves it further.
     """
     by_id = {headline.id: headline for headline in headlines}
     if not {"step", "eq8-free"} <= set(by_id):

@@ -168,13 +168,15 @@ def claims(results: Pairs) -> Claims:
 def figures(results: Pairs) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
     for (first, second), alignment in results_of(results).items():
+        rows = len(even_rows(alignment.n_slices))
+        some = f"; of {alignment.n_slices} slices {rows} are drawn, and the numbers below count the impacts of all"
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",
-            caption="One row per slice. Bars are contacts, triangles are impacts; the upper lane of a row is the first "
-            "solver, the lower the second. Where the two lanes of a row look alike, both solvers have the same "
-            "contacts and impacts of that slice. Impacts of a slice on an end are paired in order, with the smallest "
-            "sum of shifts.",
+            caption=f"One row per slice{some if rows < alignment.n_slices else ''}. Bars are contacts, triangles are "
+            "impacts; the upper lane of a row is the first solver, the lower the second. Where the two lanes of a row "
+            "look alike, both solvers have the same contacts and impacts of that slice. Impacts of a slice on an end "
+            "are paired in order, with the smallest sum of shifts.",
             alt=f"Contacts and impacts of {first} above those of {second}, one row per slice. {alignment.words}.",
             maker=figure_gantt,
             data=(alignment,),
@@ -231,7 +233,7 @@ def figure_gantt(alignment: Alignment) -> Figure:
     axes.set_xlim(-0.01 * alignment.until, 1.01 * alignment.until)
     axes.set(xlabel="time t [s]", ylabel="slice number [1], 0 starts on the base")
     axes.set_title(f"in each row: {first} above, {second} below", fontsize=10, loc="left")
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 

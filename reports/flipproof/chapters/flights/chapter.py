@@ -138,8 +138,9 @@ def figures(results: Flown) -> Iterator[Exhibit]:
     yield Exhibit(
         name="slices",
         title="Chosen slices",
-        caption="Cap at the top, base at the bottom. The first slice starts on the base, the last one on top of the "
-        "water; the one in between starts nearest the centre of mass, where the push outwards is weakest.",
+        caption="Cap at the top, base at the bottom. "
+        + "; ".join(f"slice {i} {words}" for i, words in chosen).capitalize()
+        + ". Near the centre of mass the push outwards is weakest.",
         alt="Line plots of position against time, cap (0) at the top and base (1) at the bottom, every solver. "
         + " ".join(
             f"Slice {i}, which {words}, is at the end at {_listed(ends_of[i], '.2f')} of the length."

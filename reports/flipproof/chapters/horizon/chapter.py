@@ -242,9 +242,10 @@ def figures(results: tuple[Horizon, ...]) -> Iterator[Exhibit]:
         title="Up to when ω(t) means anything",
         caption="Each curve is the width of an ensemble: the largest distance in ω between flights that should be "
         "one flight. The flights differ in arithmetic alone, by the angle of release (thin), which free flight does "
-        "not feel, or by the order in which bodies entered the engine (black); or their release differs (thick). Where "
-        "curves of different changes jump to one level, an impact happens in some of the flights only; differences "
-        "in ω below that level mean nothing.",
+        "not feel, or by the order in which bodies entered the engine (black); or their release differs in angle and "
+        "spin (thick). Other changes, such as of the slices' places, may be amplified more, and bands allow for those. "
+        "Where curves of different changes jump to one level, an impact happens in some of the flights only; "
+        "differences in ω below that level mean nothing.",
         alt="Logarithmic plots of the width of ensembles over time. "
         + ". ".join(words).replace("ω₀", "omega_0").replace("θ₀", "theta_0"),
         maker=figure_horizon,

@@ -91,8 +91,8 @@ def draw(studies: Mapping[str, SliceCount]) -> Figure:
             axes.plot(trajectory.t, omega, color=colour, linewidth=1.3, label=f"{n} slices")
         axes.set_title(scheme, fontsize=10, loc="left")
         axes.set_xlabel("time t [s]")
-        axes.set_ylim(bottom=0.0)
         axes.margins(x=0.01)
+    panels[0].set_ylim(bottom=0.0)  # of all panels, once every curve is drawn
     panels[0].set_ylabel("angular velocity ω / ω₀ [1]")
     shared_legend(figure, panels[0], columns=7)
     return figure

@@ -55,10 +55,11 @@ window.flipproofChart ??= (() => {
   }
 
   function ticks(low, high, count) {
-    const step = niceStep(high - low, count);
+    // A range of round-off alone has no ticks between its ends that a double could tell apart.
+    const step = niceStep(Math.max(high - low, 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-300), count);
     const found = [];
     for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-    return { found, digits: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
+    return { found, digits: Math.min(20, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))) };
   }
 
   function shown(value, digits) {

@@ -66,7 +66,7 @@ window.flipproofLive = (() => {
   // which errors grow, and strong drag, which pulls a light bottle along, get more. What wants more than MOST is not computed.
   const MOST = 400;
   const cuts = (step, ...rates) => Math.max(1, Math.ceil(step * Math.max(...rates) * (1 - 1e-9)));
-  const percent = (share) => (Number.isFinite(share) ? `${Number((100 * share).toPrecision(2))} %` : "not computable");
+  const percent = (share) => (Number.isFinite(share) ? `${Number((100 * share).toPrecision(share < 1 ? 2 : 3))} %` : "not computable");
 
   const restSpeed = ({ omega0, bottle }) => Math.max(1e-5, 1e-3 * Math.min(1, (Math.abs(omega0) * bottle.length) / 5.6));
 
