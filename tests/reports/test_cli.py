@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from made_up import command as run
@@ -14,7 +15,10 @@ from made_up import refused
 
 from flipproof.cli import main as cli
 from flipproof.cli.arguments import output, refuse_overwriting
+from flipproof.cli.main import _print_report
 from flipproof.cli.screens import commands_of
+from flipproof.frame.chapter import Absent
+from flipproof.frame.findings import Band, observed
 
 
 def test_eight_commands_stand_on_the_first_screen_and_every_other_on_the_second(capsys):
@@ -237,3 +241,19 @@ def test_every_file_that_a_command_checks_before_it_writes_has_the_type_of_one()
     ]
     assert len(checked) > 10
     assert set(checked) <= typed
+
+
+def test_the_end_of_a_report_names_vague_numbers_and_chapters_that_could_not_be_made(capsys):
+    findings = [
+        observed("difference-a-b", "a against b", 0.2, "of ω₀", band=Band(0.41, "twins")),
+        observed("difference-c-d", "c against d", 0.2, "of ω₀", band=Band(1e-3, "twins")),
+        Absent("chapter-waterfall", "What each assumption costs", "stalled", "observation").finding,
+        observed("paper-x", "a statement that is not judged", None),
+    ]
+    _print_report(SimpleNamespace(findings=findings, failed=(), summary={}), Path("r"), 1.0)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1:4] == [
+        "   20.000%  a against b (numerical uncertainty 41%)",
+        "   20.000%  c against d",
+        "Could not be made, for reasons in the evidence: What each assumption costs",
+    ]

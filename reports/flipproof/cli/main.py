@@ -281,9 +281,9 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
         if finding.id.startswith("measured-fit-"):
             print(f"{finding.title}: {finding.value_text} root mean square")
     page = out / "index.html"
-    absent = [finding.title for finding in report.findings if finding.kind == "observation" and finding.value is None]
+    absent = [finding.title for finding in report.findings if finding.id.startswith("chapter-") and not finding.failed]
     if absent:
-        print(f"Not observed, for reasons in the evidence: {'; '.join(absent)}")
+        print(f"Could not be made, for reasons in the evidence: {'; '.join(absent)}")
     print(f"{len(regressions) - len(report.failed)} of {len(regressions)} regression claims hold.")
     print(f"Report: {page} ({seconds:.0f} s)")
     print(answer([Headline.from_mapping(mapping) for mapping in report.summary.get("headlines", ())]))
