@@ -6,17 +6,19 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import pytest
 
-from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, FORMULAS, PROGRAM_EQ8, TOTAL
+from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, FORMULAS, PROGRAM_EQ8, TOTAL, Differences
 from flipproof.chapters.differences.study import percent
 from flipproof.chapters.finite_step.chapter import EVERYTHING, HELD, LOCATED, WAYS
 from flipproof.chapters.waterfall.study import STEP
 from flipproof.cli.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
+from flipproof.frame.equations import NAMES
 from flipproof.frame.solvers import FINER
-from flipproof.page.verdict import Headline, Measure, answer, headlines, lead, lines
+from flipproof.page.verdict import Headline, Measure, _pairs, answer, headlines, lead, lines
 
 INSTEAD = "For slices, use free flight; for water, half full or more, rods (slices without overlap) are the best guess."
 
@@ -207,6 +209,14 @@ def test_the_answer_names_each_of_three_faults_and_no_other(step, equation, form
     assert ("steps are short enough" in words) is (short and solved)
     assert words.startswith("Not as it stands") is (short and not (free and solved))
     assert words.endswith(INSTEAD) is not free
+
+
+def test_only_a_rung_from_eq8_to_free_flight_can_be_what_moves_eq8_most():
+    sizes = dict(zip(NAMES.values(), (0.1, 0.2, 0.93, 0.91, 0.05, 0.01), strict=True))
+    fields = {"slices": 5, "finer": None, "band": None, "largest_time": 0.1, "first": "a", "second": "b"}
+    pairs = tuple(SimpleNamespace(name=name, largest=size, **fields) for name, size in sizes.items())
+    (pair,) = _pairs(Differences(pairs=pairs, ended="", missing={}))
+    assert (pair.id, pair.what) == ("pair", "gravity in Eq. 8")
 
 
 def test_the_answer_needs_step_and_equation():

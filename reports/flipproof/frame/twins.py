@@ -91,7 +91,9 @@ def doubt(flight: Trajectory, seconds: float, tolerance: float = TRUSTED) -> str
             store="summary",
             rebound=flight.settings["rebound"],
         )
-        change = float(np.abs(finer.omega[::2] - flight.omega).max()) / abs(flight.scenario.omega0) if finer.ok else 1.0
+        if not finer.ok:
+            return f"{flight.label}: the step is coarse: with half of it the flight is {finer.status}: {finer.message}"
+        change = float(np.abs(finer.omega[::2] - flight.omega).max()) / abs(flight.scenario.omega0)
         coarse = f"the step is coarse: with half of it omega(t) changes by up to {change:.2g} omega_0"
         return f"{flight.label}: {coarse}" if change > COARSE else ""
     if flight.solver != "ode_reference" or "rest_speed" not in flight.settings or not len(flight.t):

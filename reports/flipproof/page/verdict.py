@@ -41,6 +41,7 @@ from flipproof.frame.equations import NAMES as RUNG_NAMES
 from flipproof.frame.findings import finite_or_none
 from flipproof.frame.gather import Gathered
 from flipproof.frame.solvers import FINER
+from ode_reference.models import MODELS
 from slicemodel import Scenario
 
 Measure = Literal["largest", "share"]
@@ -107,7 +108,8 @@ def headlines(gathered: Gathered) -> tuple[Headline, ...]:
 
 def _pairs(differences: Differences) -> Iterator[Headline]:
     named = {difference.name: difference for difference in differences.pairs}
-    after_eq8 = (RUNG_NAMES[switch] for switch in ("weightless", "origin", "recoil"))
+    eq8 = MODELS["eq8"].switches
+    after_eq8 = (name for switch, name in RUNG_NAMES.items() if not getattr(eq8, switch))
     rungs = [named[name] for name in after_eq8 if name in named]
     wanted = {
         "whole": TOTAL,
@@ -234,7 +236,7 @@ def lines(headlines: Sequence[Headline]) -> Iterator[tuple[str, str]]:
 def _differ(by_id: Mapping[str, Headline]) -> bool:
     """Return whether any two solvers of the ladder differ at all."""
     values = [by_id[id_].value for id_ in ("whole", "program-eq8", "pair") if id_ in by_id]
-    return not values or not max(values) < NOTHING
+    return not values or any(not value < NOTHING for value in values)
 
 
 def _nearer_to_free(by_id: Mapping[str, Headline]) -> bool:
@@ -409,10 +411,9 @@ def _layers(summary: Summary, numbers: Mapping[str, Number | None]) -> list[Simp
         if number is not None:
             beside = {"finer": percent, "finer_slices": plain, "band": small}
             more = {field: summary.number(f"headlines/{id_}/{field}", shown) for field, shown in beside.items()}
-            within = number.value <= PARTING_BAND
             layers.append(
                 SimpleNamespace(
-                    id=id_, name=name, section=section, question=question, number=number, within=within, **more
+                    id=id_, name=name, section=section, question=question, number=number, within=number.within, **more
                 )
             )
     return layers
@@ -511,6 +512,11 @@ class Number:
     value: float
     text: str
     source: str
+
+    @property
+    def within(self) -> bool:
+        """Whether a share of omega_0 counts as small."""
+        return self.value <= PARTING_BAND
 
     def __html__(self) -> str:
         return Markup('<data value="{!r}" data-source="{}">{}</data>').format(self.value, self.source, self.text)
