@@ -47,6 +47,10 @@ STEP: Final = 2e-5
 ICE_STEP: Final = 1e-4
 """Steps for water and for ice [s]."""
 
+STRONGEST_DRAG: Final = 1e5
+"""Largest rate at which the drag may stop all water in a free bottle [1/s]: steps are at most the inverse of that rate,
+since beyond two of it they are unstable."""
+
 TWIN: Final = 0.02
 """Share by which the touches differ that have to end alike: near an edge between outcomes a halved step may end as the
 step does and both be wrong."""
@@ -104,8 +108,8 @@ def land(
     engine : str
         A name in ``LANDERS``.
     dt : float, optional
-        Step [s], in (5e-9, 1e-3]; ``STEP`` for water or ``ICE_STEP`` for ice otherwise. Where half of it ends
-        otherwise, or gives energy, the step is halved again, ``HALVINGS`` times in all.
+        Step [s], in (5e-9, 1e-3]; ``STEP`` for water or ``ICE_STEP`` for ice otherwise; shorter with strong drag. Where
+        half of it ends otherwise, or gives energy, the step is halved again, ``HALVINGS`` times in all.
     law : str, optional
         A name in ``slicemodel.table.LAWS``; "together" by default. Ice has none.
 
@@ -121,7 +125,7 @@ def land(
     Raises
     ------
     ValueError
-        Naming the argument, its value and the admissible values.
+        Naming the argument, its value and the admissible values: also drag beyond ``STRONGEST_DRAG``.
     SetupError
         If the engine did not receive what was meant.
     """
@@ -131,8 +135,11 @@ def land(
     chosen = known_name("law", "together" if law is None else law, LAWS)
     if touch.scenario.frozen and law is not None:
         raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
-    default = ICE_STEP if immovable(touch.scenario) else STEP
+    rigid = immovable(touch.scenario)
+    default = ICE_STEP if rigid else STEP
     step = default if dt is None else checked_number("dt", dt, LONGEST_LANDING / MAX_STEPS, 1e-3 * (1 + 1e-12), " s")
+    if not rigid:
+        step = _following(touch.scenario, step)
 
     def run(touch: Touch, step: float, gap: float = CLOSED) -> Run:
         with no_log():
@@ -175,6 +182,17 @@ def land(
         },
         diagnostics={"energy_rise": fine.rise, "outcomes": outcomes, "twins": twins, "setup": dict(fine.setup)},
     )
+
+
+def _following(scenario: Scenario, step: float) -> float:
+    """Return the step, at most the time in which the drag stops the water, or raise ValueError for too strong a drag."""
+    stop = scenario.bottle.mass / (2 * scenario.damping_rate * scenario.total_mass) if scenario.drag else math.inf
+    if stop * STRONGEST_DRAG < 1:
+        raise ValueError(
+            f"drag = {scenario.drag:g} kg/s is outside [0, {scenario.drag * stop * STRONGEST_DRAG:.3g}]: no step follows "
+            f"water that stops at more than {STRONGEST_DRAG:g} /s"
+        )
+    return min(step, stop)
 
 
 def _doubt(coarse: Run, fine: Run) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from ode_reference.arguments import number_above, number_within
-from ode_reference.landing.land import state_of, world_of
+from ode_reference.landing.land import followed, state_of, world_of
 from ode_reference.landing.layout import TOUCHED, World
 from slicemodel.scenario import Scenario, refuse_other
 from slicemodel.table import Table, Touch
@@ -34,7 +34,7 @@ def fly(scenario: Scenario, table: Table, *, dt: float = FLIGHT_DT) -> Touch:
         The bottle must be over it at release, or when its centre of mass is highest: a table may stand beside the
         thrower and higher than the hand.
     dt : float
-        Longest step [s], in [1e-6, 1e-3].
+        Longest step [s], in [1e-6, 1e-3]; strong drag makes it shorter, as in ``land``.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def fly(scenario: Scenario, table: Table, *, dt: float = FLIGHT_DT) -> Touch:
     ------
     ValueError
         Naming the argument, its value and the admissible values: a bottle that does not come down on the table from
-        above within the duration.
+        above within the duration, drag that no step follows.
 
     Accuracy
     --------
@@ -53,7 +53,7 @@ def fly(scenario: Scenario, table: Table, *, dt: float = FLIGHT_DT) -> Touch:
     """
     refuse_other("scenario", scenario, Scenario)
     refuse_other("table", table, Table)
-    dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
+    dt = followed(scenario, number_within("dt", dt, 1e-6, 1e-3, unit=" s"))
     state, world = _released(scenario, table)
     begin = 0.0
     if _room(state, world) <= 0.0:
@@ -94,7 +94,7 @@ def turn(scenario: Scenario, every: float) -> tuple[FloatArray, FloatArray, Floa
     every = number_above("every", every, 0.0, scenario.duration)
     (q, s, w), world = _released(scenario, Table(height=FAR))
     record = np.full((math.ceil(scenario.duration / every) + 1, 7 + 2 * world.n), np.nan)
-    _loop(q, s, w, FLIGHT_DT, scenario.duration, world, every, record)
+    _loop(q, s, w, followed(scenario, FLIGHT_DT), scenario.duration, world, every, record)
     record[-1, :7] = scenario.duration, *q
     record = record[np.isfinite(record[:, 0])]
     theta = record[:, 3]

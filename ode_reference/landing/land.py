@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ode_reference.arguments import number_within
-from slicemodel.scenario import Scenario, known_name, refuse_other
+from slicemodel.scenario import Scenario, ScenarioError, known_name, refuse_other
 from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch
 from slicemodel.trajectory import FloatArray
 
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 DEFAULT_DT: Final = 4e-4
 """Longest step [s]; the numbers of an outcome are those of half of it."""
+
+DRAG_STEP: Final = 0.5
+"""Longest step in units of the time in which the drag stops all water in a free bottle; beyond 2 the midpoint rule, in
+which the drag is explicit, is unstable."""
 
 EDGE: Final = 8.0
 """Share by which the touches differ that have to end alike, over the step [1/s]."""
@@ -34,6 +38,9 @@ base or one that hangs an atom's width above it changes what comes after, and no
 REFINED: Final = (8, 64)
 SHORTEST: Final = 5e-6
 """How many times smaller the steps are that follow where one leaves the outcome open, and the shortest of them [s]."""
+
+STRONGEST_DRAG: Final = DRAG_STEP / SHORTEST
+"""Largest rate at which the drag may stop all water in a free bottle [1/s]."""
 
 IMMOBILE: Final = 1e-12
 """Room in the bottle below which water cannot move [L]."""
@@ -62,7 +69,7 @@ def land(
         "together" (the default) or "in-turn" (``slicemodel.table.LAWS``): who takes part in an impact on the table
         while water rests in the bottle. Ice has no law: there is nothing inside that could come after.
     dt : float
-        Longest step [s], in [1e-6, 1e-3].
+        Longest step [s], in [1e-6, 1e-3]; strong drag makes it shorter (``followed``).
 
     Returns
     -------
@@ -76,7 +83,7 @@ def land(
     ------
     ValueError
         Naming the argument, its value and the admissible values: an unknown law, a law for ice, slices that overlap
-        or lie beyond their room in the touch.
+        or lie beyond their room in the touch, drag that no step follows.
 
     Accuracy
     --------
@@ -87,7 +94,7 @@ def land(
     refuse_other("touch", touch, Touch)
     refuse_other("table", table, Table)
     chosen = _law(touch.scenario, law)
-    dt = number_within("dt", dt, 1e-6, 1e-3, unit=" s")
+    dt = followed(touch.scenario, number_within("dt", dt, 1e-6, 1e-3, unit=" s"))
     world = world_of(touch, table, chosen)
     for step in (dt, *(dt / k for k in REFINED if dt / k >= SHORTEST)):
         runs = _runs_until_two_differ(touch, world, step)
@@ -112,6 +119,33 @@ def _law(scenario: Scenario, law: str | None) -> str:
     return law
 
 
+def followed(scenario: Scenario, dt: float) -> float:
+    """Return the step, shortened to ``DRAG_STEP`` of the time in which the drag stops the water.
+
+    Water that slides as one stops at the rate alpha (1/m + N/M_b), because the tube recoils; nothing stops faster.
+
+    Raises
+    ------
+    ScenarioError
+        If that rate exceeds ``STRONGEST_DRAG``.
+    """
+    if _rigid(scenario):
+        return dt
+    shares = 1 / scenario.slice_mass + scenario.n_slices / scenario.bottle.mass
+    if scenario.drag * shares > STRONGEST_DRAG:
+        raise ScenarioError(
+            f"drag = {scenario.drag:g} kg/s is outside [0, {STRONGEST_DRAG / shares:.3g}]: a landing does not follow "
+            f"water that stops at more than {STRONGEST_DRAG:g} /s"
+        )
+    return min(dt, DRAG_STEP / (scenario.drag * shares)) if scenario.drag else dt
+
+
+def _rigid(scenario: Scenario) -> bool:
+    """Return whether no slice can move: ice, or a full bottle."""
+    length = scenario.bottle.length
+    return scenario.frozen or length - scenario.n_slices * scenario.slice_height <= IMMOBILE * length
+
+
 def world_of(touch: Touch, table: Table, law: str) -> World:
     """Return the constants of a landing, or raise ValueError for slices that are not where they may be."""
     from ode_reference.landing.layout import World
@@ -119,7 +153,7 @@ def world_of(touch: Touch, table: Table, law: str) -> World:
     scenario = touch.scenario
     bottle, n, rod = scenario.bottle, scenario.n_slices, scenario.slice_height
     half = bottle.length / 2
-    rigid = scenario.frozen or bottle.length - n * rod <= IMMOBILE * bottle.length
+    rigid = _rigid(scenario)
     # Counted from the base: i rods lie below slice i and n - 1 - i above it.
     i = np.arange(n, dtype=np.float64)
     high: FloatArray

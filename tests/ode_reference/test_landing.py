@@ -354,6 +354,20 @@ def test_a_step_of_an_engine_that_would_take_for_ever_is_refused():
         engine_check.land(at_rest(WATER), Table(height=0.0), dt=1e-12)
 
 
+@PROGRAMS
+def test_drag_shortens_the_step_and_is_refused_where_no_step_follows_it(land):
+    """With steps of 0.4 ms the energy of this landing never fell: drag is explicit in both programs."""
+    throw, table = Scenario(n_slices=10, drag=40.0, duration=1.0), Table(height=-0.33)
+    touch = ode_reference.fly(throw, table)
+    outcome = land(touch, table)
+    assert outcome.outcome == "lying"
+    coarse = land(touch, table, dt=1e-3)
+    assert coarse.settings["dt"] < 1e-4
+    assert coarse.outcome == "lying"
+    with pytest.raises(ValueError, match=r"drag = 400 kg/s is outside \[0, 265\]"):
+        land(at_rest(replace(WATER, drag=400.0)), table)
+
+
 def test_an_unknown_engine_is_refused():
     with pytest.raises(ValueError, match="engine = 'bullet' is unknown"):
         engine_check.land(at_rest(WATER), Table(height=0.0), "bullet")

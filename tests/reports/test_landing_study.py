@@ -1,6 +1,7 @@
 """Does it stand: aims, scatter, shares, the sweep of throws, and what the commands say."""
 
 import math
+import re
 import shutil
 import sqlite3
 from contextlib import nullcontext
@@ -49,7 +50,7 @@ from flipproof.presets.upright import make_upright
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.work import keyed
 from ode_reference import fly, land
-from slicemodel import Scenario, Table
+from slicemodel import Bottle, Scenario, Table
 from slicemodel.scenario import ScenarioError
 
 THROW = Scenario(n_slices=4)
@@ -271,6 +272,13 @@ def test_a_row_that_cannot_be_has_a_status_and_a_reason(design, changes, status,
     assert words in row.reason
     assert row.whole is (status == "missed")
     assert share_of([row]) == Share(upright=0, undecided=status != "missed", throws=1)
+
+
+def test_drag_that_no_step_follows_is_no_miss(design):
+    point = next(iter(design.points()))
+    row = make_landing(point.solver, point.settings, {**point.throw, "scenario": {**point.throw["scenario"], "drag": 1e4}})
+    assert (row.status, row.whole) == ("failed", False)
+    assert "drag = 10000 kg/s is outside" in row.reason
 
 
 def test_a_flight_that_was_kept_is_the_flight(design):
@@ -552,6 +560,23 @@ def test_land_says_touch_laws_and_certificate(capsys):
     words = capsys.readouterr().out
     assert "below the saddle" in words
     assert "flat" not in words
+
+
+def test_land_aims_a_throw_backwards_backwards(capsys, tmp_path):
+    (tmp_path / "back.toml").write_text("[scenario]\nomega0 = -20.0\ntheta0 = 0.3\n", encoding="utf-8")
+    assert main(["land", str(tmp_path / "back.toml"), "--slices", "4", "--aim", "B"]) == 0
+    words = capsys.readouterr().out
+    assert re.search(r"aimed: omega_0 = -0\.6\d* rad/s", words)
+    assert re.search(r"water touches .* omega -0\.6", words)
+
+
+def test_a_small_saddle_keeps_its_digits():
+    """Of a bottle of 8 mm, the saddle was said to be 0.0000 J."""
+    bottle = Bottle(length=0.008, radius=0.0025, mass=1e-6, capacity=1.2e-5)
+    throw = Scenario(bottle=bottle, water_mass=6e-6, n_slices=4, drag=1e-6, duration=0.3)
+    table = Table(height=standing(throw).height)
+    assert f"(saddle {saddle(throw):.4g} J)" in describe(land_throw(throw, table), table)
+    assert 0 < saddle(throw) < 1e-6
 
 
 def test_an_outcome_that_no_program_certifies_is_told_with_its_reason():

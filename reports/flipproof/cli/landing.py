@@ -91,7 +91,7 @@ def command_land(options: argparse.Namespace) -> int:
     _check_weight(throw)
     from flipproof.chapters.landing.single import describe, land_throw
     from flipproof.chapters.landing.study import standing
-    from flipproof.chapters.landing.throws import aimed
+    from flipproof.chapters.landing.throws import aimed, mirrored
     from flipproof.frame.beside import beside
     from slicemodel import Table
 
@@ -99,7 +99,8 @@ def command_land(options: argparse.Namespace) -> int:
     height = options.height
     if options.aim:
         aim = beside(aimed, throw, options.aim)
-        throw, height = replace(aim.throw, duration=aim.time), aim.height
+        aimed_throw = aim.throw if throw.omega0 > 0.0 else mirrored(aim.throw)
+        throw, height = replace(aimed_throw, duration=aim.time), aim.height
         print(f"aimed: omega_0 = {throw.omega0:.4f} rad/s, table at {height:.4f} m, touch after {aim.time:.4f} s")
     elif height is None:
         height = standing(throw).height

@@ -102,7 +102,7 @@ def _touch_line(name: str, touch: Touch) -> str:
         f"{name} touches at t = {touch.time:.4f} s: tilt {math.degrees(touch.tilt):+.1f} degrees, {stands} its "
         f"toppling angle by {math.degrees(abs(read['static_margin'])):.1f}; omega {touch.omega:.2f} rad/s; {falls} at "
         f"{abs(read['touch_speed']):.2f} m/s; energy {read['touch_energy']:.2f} E_s "
-        f"(saddle {saddle(touch.scenario):.4f} J)"
+        f"(saddle {saddle(touch.scenario):.4g} J)"
     )
 
 

@@ -55,12 +55,15 @@ class Aim:
     rival: float = 0.0
 
 
-def forwards(throw: Scenario) -> Scenario:
-    """Return the throw, or its mirror image, which lands alike, if it spins backwards."""
-    if throw.omega0 > 0.0:
-        return throw
+def mirrored(throw: Scenario) -> Scenario:
+    """Return the mirror image of a throw, which lands as its mirror image."""
     v_x, v_y = throw.launch_velocity
     return replace(throw, omega0=-throw.omega0, theta0=-throw.theta0, launch_velocity=(-v_x, v_y))
+
+
+def forwards(throw: Scenario) -> Scenario:
+    """Return the throw, or its mirror image if it spins backwards."""
+    return throw if throw.omega0 > 0.0 else mirrored(throw)
 
 
 def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:

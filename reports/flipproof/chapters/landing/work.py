@@ -75,6 +75,8 @@ def make_landing(program: str, settings: Mapping[str, Any], throw: Throw) -> Lan
         return Landed(status="impossible", reason=str(error))
     try:
         touch = flown(scenario, table.height)
+    except ScenarioError as error:
+        return Landed(status="failed", reason=str(error))
     except ValueError as error:
         return Landed(status="missed", reason=str(error))
     except Exception as error:
