@@ -185,12 +185,13 @@ def land(
 
 
 def _following(scenario: Scenario, step: float) -> float:
-    """Return the step, at most the time in which the drag stops the water, or raise ValueError for too strong a drag."""
+    """Return the step, at most the time in which the drag stops the water; raise ValueError for too strong a drag."""
     stop = scenario.bottle.mass / (2 * scenario.damping_rate * scenario.total_mass) if scenario.drag else math.inf
     if stop * STRONGEST_DRAG < 1:
+        strongest = scenario.drag * stop * STRONGEST_DRAG
         raise ValueError(
-            f"drag = {scenario.drag:g} kg/s is outside [0, {scenario.drag * stop * STRONGEST_DRAG:.3g}]: no step follows "
-            f"water that stops at more than {STRONGEST_DRAG:g} /s"
+            f"drag = {scenario.drag:g} kg/s is outside [0, {strongest:.3g}]: no step follows water that stops at more "
+            f"than {STRONGEST_DRAG:g} /s"
         )
     return min(step, stop)
 

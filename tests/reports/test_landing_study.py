@@ -276,7 +276,8 @@ def test_a_row_that_cannot_be_has_a_status_and_a_reason(design, changes, status,
 
 def test_drag_that_no_step_follows_is_no_miss(design):
     point = next(iter(design.points()))
-    row = make_landing(point.solver, point.settings, {**point.throw, "scenario": {**point.throw["scenario"], "drag": 1e4}})
+    strong = {**point.throw["scenario"], "drag": 1e4}
+    row = make_landing(point.solver, point.settings, {**point.throw, "scenario": strong})
     assert (row.status, row.whole) == ("failed", False)
     assert "drag = 10000 kg/s is outside" in row.reason
 

@@ -12,6 +12,7 @@ the solvers' own errors, and differences outside the ladder.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -24,7 +25,8 @@ from flipproof.foreign.checking import ask_of, drive, times_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits
 from flipproof.frame import shapley
 from flipproof.frame.equations import NAMES, canonical
-from flipproof.frame.solvers import solve
+from flipproof.frame.solvers import Run, make, solve
+from flipproof.frame.twins import BAND_WORDS, band, twins
 from ode_reference.models import MODELS
 from ode_reference.switches import Switches, are_switches
 from slicemodel import Scenario
@@ -49,6 +51,9 @@ SURE: Final = 4.0
 
 LEVELS: Final = ((-1, -2, -3), (1, 0, -1), (3, 2, 1))
 """Levels of refinement, finer ones where coarser ones are not ``SETTLED`` on an equation."""
+
+EXACT: Final = 6
+"""Decimals of a plateau that nothing makes uncertain."""
 
 SETTLED: Final = 2e-5
 """Change under refinement, fraction of omega_0, below which finer steps tell nothing new."""
@@ -237,7 +242,8 @@ class Explanation:
     """The difference of two solvers in the plateau, mean of omega/omega_0 over the second half of the flight.
 
     ``first`` and ``second`` are the places of the two; ``values`` their plateaus; ``bars`` maps a switch to its share
-    of ``difference``; ``rest`` is what no switch explains. Bars and rest sum to the difference.
+    of ``difference``; ``rest`` is what no switch explains. Bars and rest sum to the difference. ``band`` is the largest
+    numerical uncertainty of the plateau of an equation from which the bars follow (``frame.twins``), NaN if not known.
     """
 
     first: Place
@@ -245,6 +251,7 @@ class Explanation:
     values: tuple[float, float]
     bars: dict[str, float]
     rest: float
+    band: float
     slices: int
 
     @property
@@ -255,19 +262,24 @@ class Explanation:
     @property
     def text(self) -> str:
         """The explanation, one line per part."""
-        first, second = self.first, self.second
+        first, second, digits = self.first, self.second, self._digits
+        size = abs(self.difference)
+        percents = 1 if self.band < 1e-3 * size else 0
         lines = [
             first.text,
             second.text,
             f"mean of omega/omega_0 over the second half, N = {self.slices}, each solver refined as certify does: "
-            f"{first.solver} {self.values[0]:.6f}, {second.solver} {self.values[1]:.6f}, difference "
-            f"{self.difference:+.6f}",
+            f"{first.solver} {self.values[0]:.{digits}f}, {second.solver} {self.values[1]:.{digits}f}, difference "
+            f"{self.difference:+.{digits}f}",
         ]
+        if digits < EXACT:
+            known = f"at most {self.band:.1g}" if self.band > 0.0 else "not known"
+            lines.append(f"numerical uncertainty of the mean of an equation: {known} ({BAND_WORDS})")
         if self.bars:
-            lines.append("of this, on average over all orders in which the assumptions can be changed:")
+            lines.append("of the difference, on average over all orders in which the assumptions can be changed:")
         for name, share in self.bars.items():
-            part = f" ({share / self.difference:.1%} of it)" if abs(self.difference) > 1e-9 else ""
-            lines.append(f"  {share:+.6f}  {NAMES[name]}{part}")
+            part = f" ({share / self.difference:.{percents}%} of it)" if size > 1e-9 and self.band < size else ""
+            lines.append(f"  {share:+.{digits}f}  {NAMES[name]}{part}")
         lost = [one.solver for one in (first, second) if not one.on_lattice]
         rest = (
             f"what these do not explain; {' and '.join(lost)} {'solve' if lost[1:] else 'solves'} no equation of the "
@@ -275,8 +287,15 @@ class Explanation:
             if lost
             else "the rest: what no assumption explains, such as steps and errors of the two solvers"
         )
-        lines.append(f"  {round(self.rest, 6) + 0.0:+.6f}  {rest}")
+        lines.append(f"  {round(self.rest, digits) + 0.0:+.{digits}f}  {rest}")
         return "\n".join(lines)
+
+    @property
+    def _digits(self) -> int:
+        """Decimals of a number that its band leaves any sense."""
+        if not self.band > 0.0:
+            return EXACT if self.band == 0.0 else 1
+        return min(EXACT, max(1, math.ceil(-math.log10(self.band))))
 
 
 def explain(first_runner: Runner, second_runner: Runner, throw: Scenario) -> Explanation:
@@ -290,27 +309,37 @@ def explain(first_runner: Runner, second_runner: Runner, throw: Scenario) -> Exp
     # A switch without effect in one equation is set as in the other.
     start = replace(first.switches, **{name: getattr(second.switches, name) for name in first.inert})
     end = replace(second.switches, **{name: getattr(start, name) for name in second.inert})
-    bars = shares(start, end, throw)
+    bars, band = shares(start, end, throw)
     return Explanation(
         first=first,
         second=second,
         values=values,
         bars=bars,
         rest=values[1] - values[0] - sum(bars.values()),
+        band=band,
         slices=throw.n_slices,
     )
 
 
-def shares(start: Switches, end: Switches, throw: Scenario) -> dict[str, float]:
-    """Return the mean change of the plateau over all orders of turning the switches from ``start`` to ``end``."""
+def shares(start: Switches, end: Switches, throw: Scenario) -> tuple[dict[str, float], float]:
+    """Return the mean change of the plateau over all orders of turning the switches from ``start`` to ``end``.
+
+    With it: the largest band of a plateau from which this follows, NaN if a twin does not reach its end.
+    """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
+    bands: list[float] = []
 
     @cache
     def plateau_of(switches: Switches) -> float:
-        flight = curve(switches.name, throw, times_of(throw, 1000))
-        return plateau(flight.t, flight.omega, throw.omega0)
+        run = Run(switches.name, throw, {"times": times_of(throw, 1000)})
+        levels = {one: make(one).plateau for one in (run, *twins(run))}
+        bands.append(band(run, levels))
+        return levels[run]
 
     def value(turned: tuple[str, ...]) -> float:
         return plateau_of(canonical(replace(start, **{name: getattr(end, name) for name in turned})))
 
-    return shapley.fair_shares(differing, value)
+    bars = shapley.fair_shares(differing, value)
+    if not differing:
+        value(())
+    return bars, float(np.max(bands))

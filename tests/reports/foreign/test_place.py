@@ -1,5 +1,8 @@
 """Which equation a solver solves: every built-in on its own, others where they belong, wrong constants nowhere."""
 
+import math
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -114,10 +117,33 @@ def test_a_solver_does_not_differ_from_itself():
     assert (found.bars, found.rest, found.difference) == ({}, 0.0, 0.0)
 
 
+def test_a_chaotic_flight_has_no_more_digits_than_its_twins_share():
+    """In 20 s twins differ by a tenth of omega_0 and more, and six decimals were printed."""
+    throw = Scenario(n_slices=8, duration=20.0)
+    found = explain(opened("eq8"), opened("free-flight"), throw)
+    assert 0.1 < found.band < 10.0
+    assert f"numerical uncertainty of the mean of an equation: at most {found.band:.1g} (estimated as" in found.text
+    assert re.search(r"eq8 -?\d\.\d, free-flight -?\d\.\d, difference [+-]\d\.\d\n", found.text)
+    assert re.findall(r"(\S+)% of it", replace(found, band=2 * abs(found.difference)).text) == []
+    rough = re.findall(r"\((\S+)% of it", replace(found, band=0.01 * abs(found.difference)).text)
+    assert rough
+    assert not any("." in share for share in rough)
+    lost = replace(found, band=math.nan).text
+    assert "numerical uncertainty of the mean of an equation: not known" in lost
+    assert "% of it" not in lost
+
+
+def test_an_exact_flight_keeps_its_digits():
+    found = explain(opened("eq8"), opened("eq8-weightless"), Scenario(n_slices=4, duration=0.3))
+    assert found.band < 1e-6
+    assert "uncertainty" not in found.text
+    assert re.search(r"  [+-]\d\.\d{6}  gravity in Eq\. 8 \(100\.0% of it\)", found.text)
+
+
 def test_shares_sum_to_the_whole_way():
     throw = Scenario(n_slices=4, duration=0.3)
     start, end = (switches_of(name) for name in ("eq8", "free-flight"))
-    bars = shares(start, end, throw)
+    bars, _ = shares(start, end, throw)
     one, other = explain(opened("eq8"), opened("free-flight"), throw).values
     assert sum(bars.values()) == pytest.approx(other - one, abs=1e-12)
     assert len(bars) == sum(a != b for a, b in zip(vars_of(start), vars_of(end), strict=True))
