@@ -49,6 +49,12 @@ LONGEST_TURN: Final = 0.02
 """Longest step, as the angle by which the bottle turns in it at release [rad]: a gap that closes and opens again
 within one step is missed."""
 
+OVERLAPPING: Final = 1e-6
+"""Overlap that no root leaves [L]."""
+
+SHORTEST_STOP: Final = 0.2
+"""Longest step in times in which the drag stops the water: a gap opens at release and closes again as fast."""
+
 SLACK: Final = 1e-9
 """Push that counts as none [M_w omega^2 L]: at the instant of a release its root leaves 1e-12."""
 
@@ -181,6 +187,10 @@ class _Flight:
         room = tube.length - scenario.n_slices * scenario.slice_height
         self.immobile = scenario.frozen or room <= TOUCHING * tube.length
         self.status, self.message = "ok", ""
+        stopping = scenario.drag * (1 / scenario.slice_mass + scenario.n_slices / scenario.bottle.mass)
+        self.longest_step = LONGEST_TURN / abs(scenario.omega0)
+        if stopping * self.longest_step > SHORTEST_STOP:
+            self.longest_step = SHORTEST_STOP / stopping
 
     def split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return x and u of a state."""
@@ -219,11 +229,13 @@ class _Flight:
         events = [] if self.immobile else [self._event(j) for j in range(self.tube.n + 1)]
         run = solve_ivp(
             self.slope, (self.t, stop), self.y, events=events or None, dense_output=True,
-            max_step=LONGEST_TURN / abs(self.scenario.omega0), **self.options,
+            max_step=self.longest_step, **self.options,
         )  # fmt: skip
         if run.status < 0:
             raise ArithmeticError(f"rods: {run.message} at t = {run.t[-1]:.9g} s")
         self.t, self.y = float(run.t[-1]), run.y[:, -1].copy()
+        if (deepest := self.tube.gaps(self.split(self.y)[0]).min()) < -OVERLAPPING * self.tube.length:
+            raise ArithmeticError(f"rods overlap by {-deepest:.2g} m at t = {self.t:.9g} s: the step missed an impact")
         self.rebounding[:] = False
         if run.status == 1:
             self._meet()

@@ -26,6 +26,15 @@ def test_it_ends_where_the_rods_touch():
     np.testing.assert_allclose(one.r, other.r, atol=1e-3)
 
 
+def test_rods_that_meet_in_strong_drag_touch_where_the_rods_do():
+    throw = replace(THROW, drag=10.0)
+    one = ode_reference.fly(throw, TABLE, dt=5e-5)
+    other = touch(rods_by_events.solve(throw, times=np.linspace(0.0, 0.55, 5501)), TABLE)
+    assert one.time == pytest.approx(other.time, abs=1e-6)
+    assert one.theta == pytest.approx(other.theta, abs=1e-5)
+    assert one.omega == pytest.approx(other.omega, abs=1e-4)
+
+
 @pytest.mark.parametrize("drag", [50.0, 500.0, 1300.0])
 def test_drag_that_stops_the_water_within_a_step_is_followed(drag):
     """Two slices that part and never meet fly as free flight has them, which is solved elsewhere without steps.
