@@ -161,7 +161,7 @@ def run_engine(
     run = import_module(ENGINES[engine].module).run
     t_out = output_times(scenario, times)
     order = Order(
-        dt=checked_number("dt", DEFAULT_DT if dt is None else dt, float(t_out[-1]) / MAX_STEPS, math.inf, " s"),
+        dt=_checked_step(DEFAULT_DT if dt is None else dt, float(t_out[-1])),
         iterations=_checked_iterations(iterations),
         times=t_out,
         ice=ice,
@@ -181,6 +181,14 @@ def checked_number(name: str, value: object, above: float, below: float, unit: s
     if not above < float(value) < below:
         raise ValueError(f"{name} = {float(value)!r}{unit} is outside {admissible}")
     return float(value)
+
+
+def _checked_step(dt: object, end: float) -> float:
+    """Return a step if a flight up to the time ``end`` has at most ``MAX_STEPS`` of it, else raise ValueError."""
+    try:
+        return checked_number("dt", dt, end / MAX_STEPS, math.inf, " s")
+    except ValueError as error:
+        raise ValueError(f"{error}: a flight of {end:g} s has at most {MAX_STEPS:g} steps") from None
 
 
 def _checked_iterations(iterations: object) -> int | None:

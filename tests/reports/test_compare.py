@@ -62,6 +62,14 @@ def test_two_columns_are_enough(capsys, tmp_path, first, second, quantity, witho
     assert "compared at 3 times that both have; nothing is interpolated" in out
 
 
+def test_small_numbers_keep_their_digits_and_curves_part_at_a_time_that_both_have(capsys, tmp_path):
+    a = written(tmp_path / "a.csv", "t,omega\n0,1e-8\n1,1e-8\n2,1e-8\n")
+    b = written(tmp_path / "b.csv", "t,omega\n0,1e-8\n1,1e-8\n2,2.5e-8\n")
+    out = flipproof(capsys, a, b)[1]
+    assert re.search(r"omega\(2 s\) \[rad/s\] +1e-08 +2\.5e-08  \+1\.5e-08", out)
+    assert "first more than 1% of omega_0 apart: 2 s" in out
+
+
 def test_curves_are_named_by_their_files(capsys, tmp_path):
     (tmp_path / "x").mkdir()
     a, b = (written(tmp_path / name, "t,omega\n0,1\n1,2\n") for name in ("flight.csv", "x/flight.csv"))

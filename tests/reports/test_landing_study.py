@@ -96,6 +96,15 @@ def test_an_aim_touches_at_the_angle_aimed_at(frozen, family, offset):
         assert aim.throw.omega0 == pytest.approx(9.42 + offset / 0.5, abs=0.01) or not frozen
 
 
+def test_a_bottle_that_is_upright_before_it_falls_is_aimed_a_turn_later():
+    """It was aimed at a table that it left at once, rising, and met much later at another angle."""
+    aim = aimed(replace(THROW, theta0=-0.3), "A")
+    assert aim.time > THROW.launch_velocity[1] / THROW.gravity
+    touch = fly(aim.throw, Table(height=aim.height))
+    assert touch.time == pytest.approx(aim.time, abs=2e-5)
+    assert touch.theta == pytest.approx(math.tau, abs=2e-3)
+
+
 @pytest.mark.parametrize(
     ("changes", "family", "offset", "words"),
     [

@@ -9,7 +9,6 @@ import numpy as np
 
 from flipproof.chapters.differences.study import PARTING_BAND
 from flipproof.curves.compare import on_common_times
-from flipproof.curves.growth import first_crossing
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.tables import QUANTITIES, Curve
 from slicemodel.observables import plateau
@@ -128,7 +127,7 @@ def table(both: Comparison) -> str:
 
     def row(words: str, numbers: tuple[float, float]) -> None:
         a, b = numbers
-        a_text, b_text = (f"{x:.5f}" if abs(x) < 1e6 else f"{x:.6g}" for x in (a, b))
+        a_text, b_text = f"{a:.6g}", f"{b:.6g}"
         lines.append(f"{words:34}{a_text:>{width}}  {b_text:>{width}}  {(b - a) or 0.0:+.3g}")
 
     for gap in both.apart:
@@ -141,8 +140,8 @@ def table(both: Comparison) -> str:
         size = f"{100 * largest:.3g}% of omega_0" if gap.quantity == "omega" else f"{largest:.3g} {UNITS[gap.quantity]}"
         lines.append(f"largest |difference in {SYMBOLS[gap.quantity]}|: {size} at t = {time:.5g} s")
         if gap.quantity == "omega":
-            parting = first_crossing(gap.t, gap.size, PARTING_BAND)
-            words = "never" if parting is None else f"{parting:.5g} s"
+            parted = gap.t[gap.size > PARTING_BAND]
+            words = f"{parted[0]:.5g} s" if len(parted) else "never"
             lines.append(f"first more than {PARTING_BAND:.0%} of omega_0 apart: {words}")
     return "\n".join(line.replace("\n", r"\n") for line in lines)
 

@@ -37,7 +37,7 @@ class Checked:
     """The claims that were checked, and the baseline's findings that were not.
 
     ``seconds`` are the wall times that the claims took [s], by their ids; the first of a group has that of its runs.
-    ``own`` counts the claims that are tried on flipproof's own throws, whatever throw is checked.
+    ``own`` counts the claims that are tried on flipproof's own throws, or on the paper's formulas.
     """
 
     findings: tuple[Finding, ...]
@@ -56,7 +56,7 @@ class Checked:
         words = f"{len(self.findings) - len(self.failed)} of {len(self.findings)} checks hold"
         if self.own:
             of_throw = len(self.findings) - self.own
-            words += f"; {of_throw} are of this throw, {self.own} of flipproof on throws of its own"
+            words += f"; {of_throw} are of this throw, {self.own} of flipproof or the paper, whatever the throw"
         words += "."
         if self.left_out:
             groups = Counter(name.partition("-")[0] for name in self.left_out)
@@ -114,7 +114,7 @@ def check(
             if was is not None:
                 held, needs = _held_to(finding, was, tolerance, moves=moves)
             findings.append(held)
-            own += group in OWN_THROWS
+            own += group in OWN_THROWS or finding.id.startswith("erratum-")
             say(line(held, needs))
     recomputed = {finding.id for finding in findings}
     left_out = tuple(name for name in old_findings if name not in recomputed) if "thresholds" in groups else ()

@@ -222,7 +222,7 @@ class Comparison:
                 )
         if (horizon := self.horizon) is not None:
             at = next(column.tolerance for column in self.columns if column.horizon == horizon)
-            lines.append(f"beyond t = {horizon:.4g} these two cannot be compared at {at:g}")
+            lines.append(f"from t = {horizon:.4g} on these two cannot be compared at {at:g}")
         lines += self.events.lines(self.parted)
         for finding in self.findings:
             numbers = "" if finding.value is None else f"{finding.value:.3g}, {finding.threshold_text}, "

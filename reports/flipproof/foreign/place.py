@@ -276,7 +276,7 @@ class Explanation:
             known = f"at most {self.band:.1g}" if self.band > 0.0 else "not known"
             lines.append(f"numerical uncertainty of the mean of an equation: {known} ({BAND_WORDS})")
         if self.bars:
-            lines.append("of the difference, on average over all orders in which the assumptions can be changed:")
+            lines.append("of the difference, on average over all orders in which these assumptions can be changed:")
         for name, share in self.bars.items():
             part = f" ({share / self.difference:.{percents}%} of it)" if size > 1e-9 and self.band < size else ""
             lines.append(f"  {share:+.{digits}f}  {NAMES[name]}{part}")
@@ -288,6 +288,11 @@ class Explanation:
             else "the rest: what no assumption explains, such as steps and errors of the two solvers"
         )
         lines.append(f"  {round(self.rest, digits) + 0.0:+.{digits}f}  {rest}")
+        if self.bars and set(first.inert) & set(second.inert):
+            still = " and ".join(NAMES[name] for name in sorted(set(first.inert) & set(second.inert)))
+            lines.append(
+                f"without effect in both equations, and not changed here: {still} (a waterfall changes it, too)"
+            )
         return "\n".join(lines)
 
     @property

@@ -35,6 +35,9 @@ COARSE: Final = 0.01
 SLOW: Final = 10.0
 """Seconds of a flight from which its twins are not flown unasked: they take nine times as long."""
 
+QUICK: Final = 1e5
+"""Steps of an engine, times slices, up to which half the step is tried unasked: a second or so."""
+
 BAND_WORDS: Final = (
     f"estimated as {SAFETY:g} times the largest change by {TWINS} twins, whose release differs in the eleventh digit, "
     f"and by a rest speed {CUT:g} times smaller"
@@ -77,12 +80,27 @@ def omega_band_call(run: Run) -> Call:
     return Call(omega_band, (run,), f"{run.name}, band")
 
 
+def _doubt_of_engine(flight: Trajectory, tolerance: float) -> str:
+    """Return what half of an engine's step changes, if that is more than the tolerance [omega_0] or would take long."""
+    dt, scenario = float(flight.settings["step"]), flight.scenario
+    begin = f"{flight.label}: steps of {dt:.2g} s, not certified"
+    if scenario.n_slices * scenario.duration / dt > QUICK:
+        return f"{begin}; what they change was not measured"
+    finer = make(Run(flight.method, scenario, {"dt": dt / 2, "times": flight.t}))
+    if finer.problem:
+        return f"{begin}; with half of them the flight does not reach its end: {finer.problem}"
+    change = float(np.abs(finer.whole.omega - flight.omega).max()) / abs(scenario.omega0)
+    return f"{begin}; half of them change omega(t) by up to {change:.2g} omega_0" if change > tolerance else ""
+
+
 def doubt(flight: Trajectory, seconds: float, tolerance: float = TRUSTED) -> str:
     """Return up to when omega(t) of a flight may be trusted to a tolerance [omega_0]; nothing if that is to its end.
 
-    ``seconds`` is how long the flight took. Of a scheme it is said if its step is ``COARSE``; of other solvers without
-    twins nothing is said.
+    ``seconds`` is how long the flight took. Of a scheme it is said if its step is ``COARSE``, of an engine what half
+    the step changes beyond the tolerance; of other solvers without twins nothing is said.
     """
+    if flight.solver == "engine_check" and flight.ok and not flight.scenario.frozen:
+        return _doubt_of_engine(flight, tolerance)
     if flight.solver == "slicemodel" and flight.ok and seconds < SLOW:
         finer = solve(
             flight.method,

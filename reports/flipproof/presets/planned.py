@@ -270,6 +270,6 @@ def _table(waterfall: Waterfall) -> str:
         lines.append(f"  {bar.forward:+8.4f}  {bar.backward:+8.4f}  {bar.average:+8.4f} {band:9}  {bar.name}")
     lines += [
         f"  {waterfall.end:+8.4f}  {space}free flight (+- {max(waterfall.end_band, FLOOR):.1g})",
-        f"  {waterfall.overlap:+8.4f}  {space}rods minus free flight: no overlap, no share",
+        f"  {waterfall.overlap:+8.4f}  {space}rods minus free flight: two models of the water, no share",
     ]
     return "\n".join(lines)

@@ -117,6 +117,15 @@ def test_a_solver_does_not_differ_from_itself():
     assert (found.bars, found.rest, found.difference) == ({}, 0.0, 0.0)
 
 
+def test_what_neither_equation_feels_is_said_not_to_be_changed():
+    """A report's waterfall changes it on the way, and has other shares for that reason."""
+    found = explain(opened("published-limit"), opened("free-flight"), Scenario(n_slices=4, duration=0.3))
+    assert "drag_on_centre" not in found.bars
+    assert "not changed here: drag against C_M (a waterfall changes it, too)" in found.text
+    found = explain(opened("eq8"), opened("free-flight"), Scenario(n_slices=4, duration=0.3))
+    assert "not changed here" not in found.text
+
+
 def test_a_chaotic_flight_has_no_more_digits_than_its_twins_share():
     """In 20 s twins differ by a tenth of omega_0 and more, and six decimals were printed."""
     throw = Scenario(n_slices=8, duration=20.0)

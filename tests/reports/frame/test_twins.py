@@ -11,7 +11,7 @@ import slicemodel
 from flipproof.cli.main import main
 from flipproof.frame import timing, twins
 from flipproof.frame.findings import RULES, Band, observed
-from flipproof.frame.solvers import Missing, Run
+from flipproof.frame.solvers import Missing, Run, make
 from slicemodel import Scenario
 
 THROW = Scenario().with_slices(6)
@@ -59,6 +59,20 @@ def test_simulate_and_compare_say_up_to_when_a_flight_may_be_trusted(tmp_path, c
     assert "eq8: omega(t) may be trusted to 0.001 omega_0 until t = 3." in capsys.readouterr().out
     assert main(["compare", "eq8", "eq8", "--slices", "4"]) == 0
     assert "trusted" not in capsys.readouterr().out
+
+
+def test_an_engine_says_what_half_its_step_changes():
+    throw = Scenario(n_slices=3, water_mass=0.8, drag=2.0, duration=0.2)
+    times = np.linspace(0.0, 0.2, 201)
+    coarse = make(Run("pymunk", throw, {"dt": 1e-2, "times": times})).whole
+    fine = make(Run("pymunk", throw, {"dt": 5e-4, "times": times})).whole
+    change = float(np.abs(fine.omega - coarse.omega).max())
+    words = f"pymunk: steps of 0.001 s, not certified; half of them change omega(t) by up to {change / 20:.2g} omega_0"
+    assert twins.doubt(coarse, 0.1) == words
+    assert twins.doubt(coarse, 0.1, 0.5) == ""
+    fine = make(Run("pymunk", throw.with_slices(100), {"dt": 1e-4, "times": times})).whole
+    assert twins.doubt(fine, 0.1) == "pymunk: steps of 0.0001 s, not certified; what they change was not measured"
+    assert twins.doubt(make(Run("pymunk", replace(throw, frozen=True), {"dt": 1e-3})).whole, 0.1) == ""
 
 
 def test_simulate_and_compare_say_that_a_step_is_coarse(tmp_path, capsys):

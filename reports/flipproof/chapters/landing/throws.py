@@ -2,9 +2,9 @@
 
 Of the throws of a case a share ends upright; the interval of that share is Wilson's.
 
-Family A throws at the omega_0 given and solves for the height of the table; family B keeps the time of flight and
-solves for omega_0. Between release and touch nothing but its water decides how far a bottle turns: its
-flight has no table and no scatter.
+Family A throws at the omega_0 given and solves for the height of the table that it meets as it falls; family B keeps
+the time of flight and solves for omega_0. Between release and touch nothing but its water decides how far a bottle
+turns: its flight has no table and no scatter.
 """
 
 from __future__ import annotations
@@ -69,8 +69,9 @@ def forwards(throw: Scenario) -> Scenario:
 def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
     """Return the throw whose lowest rim is at the height of the table ``offset`` [rad] beyond the next upright angle.
 
-    A bottle whose rim turns faster than the bottle falls, omega R > |v_y|, has met such a table a moment before: ice
-    of family A does. Of a throw that spins backwards, the mirror image is aimed.
+    Of family A, the next one at which its centre of mass falls. A bottle whose rim turns faster than the bottle falls,
+    omega R > |v_y|, has met such a table a moment before: ice of family A does. Of a throw that spins backwards, the
+    mirror image is aimed.
 
     Raises
     ------
@@ -93,7 +94,10 @@ def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
 
 def _by_height(throw: Scenario, goal: float) -> Aim:
     t, theta, rim = turn(replace(throw, duration=LONGEST), 1e-3)
-    reached = np.flatnonzero(theta >= goal)
+    falls = t > throw.launch_velocity[1] / throw.gravity
+    if falls.any() and (passed := theta[falls][0] - goal) > 0.0:  # upright before it falls: another turn
+        goal += math.tau * math.ceil(passed / math.tau)
+    reached = np.flatnonzero(falls & (theta >= goal))
     if not reached.size:
         raise ValueError(
             f"theta stays below {math.degrees(theta.max()):.0f} degrees for {LONGEST:g} s at omega0 = {throw.omega0:g} "
