@@ -51,7 +51,8 @@ def near_full(rng: np.random.Generator) -> Scenario:
 
 def in_other_unit(throw: Scenario, unit: float) -> np.ndarray:
     """Return omega / omega_0 of free flight at ``TIMES``, computed in a unit of time that is ``unit`` seconds."""
-    spin, speed = throw.omega0 * unit, ode_reference.solver.REST_SPEED_WITH_RECOIL * unit
+    switches = ode_reference.MODELS["free-flight"].switches
+    spin, speed = throw.omega0 * unit, ode_reference.solver.usual_rest_speed(switches, throw) * unit
     scaled = replace(throw, omega0=spin, duration=throw.duration / unit, gravity=throw.gravity * unit**2)
     return ode_reference.solve(scaled, "free-flight", TIMES / unit, rest_speed=speed).omega / spin
 

@@ -160,8 +160,8 @@ def solve(
     method, and ``trusted_until`` says up to when (docs/theory.md, "Rests, and the band they cost"). Where gamma =
     |omega0| exactly and ``roots`` are off, nothing pushes the water and it stays where it is. A full bottle that no
     weight pulls along its axis is its own mirror image for ever: all methods hold it to that,
-    since rounding would part the two halves as exp(theta) grows, and the hits of a pair with them. Water a hair short
-    of full does part, after some turns.
+    since rounding would part the two halves as exp(theta) grows, and the hits of a pair with them. Its twins do part,
+    and so does water a hair short of full: with recoil a band is wide there.
 
     The other methods add the error of their steps: at their default tolerances they agree with "taylor" to the same
     band over half a second. An error grows as slices fly apart, and rests end it: with e = 1 and without drag none

@@ -140,7 +140,7 @@ class _Flight:
         # Nothing tells the ends of a full bottle apart if no weight pulls along it.
         weightless = model.switches.weightless or scenario.gravity == 0.0
         stacked = type(scenario).initial_positions is Scenario.initial_positions
-        self.mirrored = stacked and scenario.fill_fraction == 1.0 and weightless
+        self.mirrored = stacked and scenario.fill_fraction == 1.0 and weightless and not np.any(moved)
         self.t = 0.0
         self.y = np.concatenate([[scenario.theta0], scenario.initial_positions() + moved, np.zeros(n)])
         self.resting: SideArray = np.zeros(n, dtype=np.int64)

@@ -89,7 +89,7 @@ def prepare(
     throw, n = Throw.of(scenario), scenario.n_slices
     gravity = 0.0 if switches.weightless else throw.gravity
     stacked = type(scenario).initial_positions is Scenario.initial_positions  # else let go elsewhere than Eq. 3a says
-    full = stacked and scenario.fill_fraction == 1.0 and not np.any(speeds)
+    full = stacked and scenario.fill_fraction == 1.0 and not np.any(speeds) and not np.any(moved)
     given = {
         "slice_mass": throw.slice_mass,
         "bottle_mass": throw.bottle_mass,
