@@ -232,7 +232,8 @@ class _Flight:
                 continue
             events += 1
             if events > MAX_EVENTS:
-                raise _StalledError(f"{events} impacts within one step of {h:.3g} s; reduce dt or raise rest_flight")
+                words = "reduce dt or raise rest_flight of engine_check.solve"
+                raise _StalledError(f"{events} impacts within one step of {h:.3g} s; {words}")
 
     def _first_hit(self, start: tuple[FloatArray, FloatArray], out: IntArray, h: float) -> float:
         """Return the earliest time in [0, h] at which a slice met the end beyond which (``out``) it is now [s]."""

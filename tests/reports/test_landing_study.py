@@ -580,6 +580,13 @@ def test_land_aims_a_throw_backwards_backwards(capsys, tmp_path):
     assert re.search(r"water touches .* omega -0\.6", words)
 
 
+def test_an_aim_whose_table_is_met_before_is_refused_as_an_aim(capsys, tmp_path):
+    (tmp_path / "ice.toml").write_text("[scenario]\nomega0 = -7.0\nfrozen = true\n", encoding="utf-8")
+    status, out, err = command(capsys, "land", str(tmp_path / "ice.toml"), "--slices", "4", "--aim", "A")
+    assert (status, out) == (2, "")
+    assert "--aim A: no table meets this bottle from above when it is upright (table.height = 0.1" in err
+
+
 def test_a_small_saddle_keeps_its_digits():
     """Of a bottle of 8 mm, the saddle was said to be 0.0000 J."""
     bottle = Bottle(length=0.008, radius=0.0025, mass=1e-6, capacity=1.2e-5)

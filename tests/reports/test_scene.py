@@ -54,6 +54,13 @@ def test_the_joints_of_a_urdf_are_those_of_the_throw(tmp_path):
         assert np.array_equal(place + THROW.bottle.length * axis, [0.0, -THROW.bottle.length / 2, 0.0])
 
 
+def test_answers_that_hang_on_the_last_digits_say_so(tmp_path):
+    long = replace(THROW.with_slices(10), drag=0.0, duration=5.0)
+    words = write_scene(long, tmp_path)
+    assert words.startswith("free-flight: omega(t) may be trusted to 0.001 omega_0 until t = ")
+    assert json.loads((tmp_path / "scene.json").read_text())["doubt"] == words
+
+
 @pytest.mark.parametrize("name", ["mass", "diaginertia"])
 def test_the_read_back_sees_a_scene_that_is_off_by_two_parts_in_a_million(name, tmp_path):
     pytest.importorskip("mujoco")

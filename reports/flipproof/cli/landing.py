@@ -101,12 +101,19 @@ def command_land(options: argparse.Namespace) -> int:
         aim = beside(aimed, throw, options.aim)
         aimed_throw = aim.throw if throw.omega0 > 0.0 else mirrored(aim.throw)
         throw, height = replace(aimed_throw, duration=aim.time), aim.height
-        print(f"aimed: omega_0 = {throw.omega0:.4f} rad/s, table at {height:.4f} m, touch after {aim.time:.4f} s")
     elif height is None:
         height = standing(throw).height
     table = Table(height=height, restitution=options.restitution, friction=options.friction)
     programs = list(dict.fromkeys(name.strip() for name in options.programs.split(",")))
-    rows = beside(land_throw, throw, table, options.law, programs)
+    try:
+        rows = beside(land_throw, throw, table, options.law, programs)
+    except ValueError as error:
+        if options.aim and "table.height" in str(error):
+            words = f"--aim {options.aim}: no table meets this bottle from above when it is upright ({error})"
+            raise ValueError(words) from error
+        raise
+    if options.aim:
+        print(f"aimed: omega_0 = {throw.omega0:.4f} rad/s, table at {height:.4f} m, touch after {aim.time:.4f} s")
     print(describe(rows, table))
     return 0
 

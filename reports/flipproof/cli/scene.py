@@ -24,8 +24,10 @@ def command_scene(options: argparse.Namespace) -> int:
 
     throw = read_scenario(options.scenario, options.slices)
     with replaced_folder(options.out, "scene") as folder:
-        write_scene(throw, folder, options.format)
+        doubted = write_scene(throw, folder, options.format)
     engine = "pinocchio" if options.format == "urdf" else "mujoco"
     print(f"{options.out}: the scene, scene.json, answers.csv")
+    if doubted:
+        print(f"answers.csv, {doubted}")
     print(f"python {options.out / 'readback.py'} {engine}  # holds masses and inertias of an engine against scene.json")
     return 0

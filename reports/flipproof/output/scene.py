@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
 import ode_reference
 from flipproof.frame.columns import json_ready
+from flipproof.frame.twins import doubt
 from flipproof.output.folder import write_text
 from flipproof.output.tables import trajectory_csv
 from slicemodel.scenario import Scenario
@@ -26,15 +28,18 @@ SLICE_INERTIA: Final = 1e-12
 """Moment of inertia of a slice about its own centre [kg m^2]: 1e-9 of that of the paper's bottle."""
 
 
-def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> None:
+def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> str:
     """Write scene.xml or scene.urdf, scene.json (masses, inertias, release, impacts), answers.csv and readback.py.
 
-    The answers are free flight by ``ode_reference``. Raises ValueError for ice, whose slices have no joints, and for a
-    flight that stops before its end, and OSError if the folder cannot be written.
+    The answers are free flight by ``ode_reference``; returns how long omega(t) of it may be trusted, if not to the end.
+    Raises ValueError for ice, whose slices have no joints, and for a flight that stops before its end, and OSError if
+    the folder cannot be written.
     """
     if throw.frozen:
         raise ValueError("frozen = true: the slices of a scene move")
+    began = time.perf_counter()
     flight, bottle = ode_reference.solve(throw, "free-flight"), throw.bottle
+    doubted = doubt(flight, time.perf_counter() - began)
     if not flight.ok:
         raise ValueError(f"there are no answers for this throw: {flight.status}: {flight.message}")
     across = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)  # Eq. 11a
@@ -54,11 +59,13 @@ def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> None:
         "qpos": qpos,
         "qvel": qvel,
         "impacts": impacts,
+        "doubt": doubted,
     }
     write_text(folder / scene, _urdf(throw, bodies) if form == "urdf" else _mjcf(throw, bodies, qpos, qvel))
     write_text(folder / "scene.json", json.dumps(json_ready(facts), indent=1) + "\n")
     write_text(folder / "answers.csv", trajectory_csv(flight))
     write_text(folder / "readback.py", Path(__file__).with_name("scene_readback.py").read_text(encoding="utf-8"))
+    return doubted
 
 
 def _mjcf(throw: Scenario, bodies: dict[str, list[float]], qpos: list[float], qvel: list[float]) -> str:

@@ -194,7 +194,8 @@ def share_line(results: LandingStudy, family: str) -> str:
         for fill, cell in results.along("filling", kind, family):
             (low, high), share = cell.share.interval, cell.share
             undecided = f", {share.undecided} undecided" if share.undecided else ""
-            words.append(f"{fill:g}: {share.upright} of {share.throws}{undecided} [{low:.3f}, {high:.3f}]")
+            missed = f", {cell.missed} never met the table from above" if cell.missed else ""
+            words.append(f"{fill:g}: {share.upright} of {share.throws}{undecided}{missed} [{low:.3f}, {high:.3f}]")
         if words:
             lines.append(f"  {landing.words}: " + ", ".join(words))
     return "\n".join(lines)
