@@ -155,10 +155,11 @@ def _estimate(options: argparse.Namespace, paths: tuple[Path, ...], scenario: An
         paths, cap=options.cap, base=options.base, length_unit=options.length_unit, time_unit=options.time_unit,
         frame_rate=options.frame_rate, quantity=options.quantity,
     )  # fmt: skip
-    if options.release is not None and options.landing is not None and not options.release < options.landing:
-        raise ValueError(f"landing = {options.landing:g} s does not follow release = {options.release:g} s")
+    release = film.release if options.release is None else options.release
+    if release is not None and options.landing is not None and not release < options.landing:
+        raise ValueError(f"landing = {options.landing:g} s does not follow release = {release:g} s")
     held = Held(
-        release=options.release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
+        release=release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
         scale="scale" in options.hold, noise=options.noise,
     )  # fmt: skip
     with progress_bar(solver, "flight") as step:

@@ -37,7 +37,7 @@ SCHEMA: Final = MappingProxyType(
         "cap_doubted": "1: the click is more likely bad than not",
         "base_doubted": "1: the click is more likely bad than not",
         "in_flight": "1: from release to touch",
-        "t_over_T": "(t - release) / (touch - release)",
+        "t_over_T": "(t - release) / (touch - release); empty if the film ends before the touch",
         "line": "line of the file the frame came from",
     }
 )
@@ -110,6 +110,9 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
         [[number_of(path, line, name, cells[k]) if cells[k].strip() else np.nan
           for name, k in zip(wanted, indices, strict=True)] for line, cells in rows]
     ).reshape(-1, len(wanted))  # fmt: skip
+    flight, release = (None, None) if chosen == "points" else _flight_of_track(path, names, rows)
+    if flight is not None:
+        rows, numbers = [row for row, flies in zip(rows, flight, strict=True) if flies], numbers[flight]
     lines = np.array([line for line, _ in rows], dtype=np.int64)
     if "line" in names:
         lines = np.array([int(number_of(path, n, "line", cells[names.index("line")])) for n, cells in rows])
@@ -126,8 +129,32 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     if chosen == "points":
         values = np.array([numbers[:, 1:3], numbers[:, 3:5]])
         return Film(label=path.name, t=t, values=values, quantity=chosen, lines=lines, notes=("a track.csv",))
-    note = f"a table of {chosen}: its first row is the release unless --release says otherwise"
-    return Film(label=path.name, t=t, values=numbers[None, :, 1:], quantity=chosen, lines=lines, notes=(note,))
+    note = (
+        f"a table of {chosen}: its first row is the release unless --release says otherwise"
+        if release is None
+        else f"{chosen} of a track.csv, from its release to its touch"
+    )
+    return Film(
+        label=path.name, t=t, values=numbers[None, :, 1:], quantity=chosen, lines=lines, notes=(note,), release=release
+    )
+
+
+def _flight_of_track(
+    path: Path, names: Sequence[str], rows: Sequence[tuple[int, Sequence[str]]]
+) -> tuple[NDArray[np.bool_] | None, float | None]:
+    """Return which rows of a track.csv fly and the release that its t_over_T states [s]; None of another table."""
+    wanted = ("t", "in_flight", "t_over_T")
+    if not set(wanted) <= set(names):
+        return None, None
+    columns = [names.index(name) for name in wanted]
+    t, flies, share = np.array(
+        [[number_of(path, line, name, cells[k]) if cells[k].strip() else np.nan
+          for name, k in zip(wanted, columns, strict=True)] for line, cells in rows]
+    ).T  # fmt: skip
+    known = np.isfinite(t) & np.isfinite(share)
+    if known.sum() < 2:
+        return flies == 1.0, None
+    return flies == 1.0, float(np.polyfit(share[known], t[known], 1)[1])
 
 
 def _from_tracks(table: TrackTable, cap: str, base: str, unit: str, time_unit: str, frame_rate: float | None) -> Film:

@@ -56,6 +56,13 @@ EDGE: Final = 5.0
 MIN_CELLS: Final = 40
 """Effective number of cells that share the posterior mass from which on they are cut no further."""
 
+SHARP: Final = (4.0, 1e-3)
+"""Effective number of cells of the grid that has closed in, and height of one in e, below which it is a sharp peak.
+
+With little drag and noise there are many, and it may not be the highest. Of 36 films of another author, four had fewer
+than 4 cells lower than 1e-3, and all four missed gamma or e; of three that had fewer cells, 4e-3 and higher, none did.
+"""
+
 MAX_CUTS: Final = 4
 """Largest number of times that a cell is cut."""
 
@@ -98,6 +105,7 @@ class Estimate:
     touched : bool - whether the record goes on after the flight
     flights : int - of the solver
     complete : bool - whether there was time for the grid to close in
+    rugged : bool - whether the grid closed in on a peak as sharp as ``SHARP``, beside which there may be a higher one
     first_guess_cost : float - of the likeliest first guess
     """
 
@@ -113,6 +121,7 @@ class Estimate:
     touched: bool
     flights: int
     complete: bool
+    rugged: bool = False
     first_guess_cost: float = 0.0
 
     @property
@@ -219,6 +228,7 @@ def _estimate_from(
     likelihood, grid, complete = _adaptive_grid(likelihood, equation, x, seconds)
     if not np.isfinite(grid.log_masses).any():
         raise NoFlightError(f"{film.label}: {solver}: no flight fits the clicks; check that y points up")
+    rugged = _effective_cells(grid) < SHARP[0] and grid.cells[:, 1].max() < SHARP[1]
     if complete:
         grid = _refine(likelihood, equation, grid, start_time + seconds)
     fits, curves = grid.fits, grid.curves
@@ -233,7 +243,7 @@ def _estimate_from(
     return Estimate(
         film=film, throw=sliced, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
         draws=draws, evidence=float(np.logaddexp.reduce(grid.log_masses) - np.log(np.arcsinh(MAX_RATE / SCALE))),
-        touched=bool(likelihood.touch < film.t[-1]), flights=n_flights, complete=complete,
+        touched=bool(likelihood.touch < film.t[-1]), flights=n_flights, complete=complete, rugged=bool(rugged),
     )  # fmt: skip
 
 
@@ -343,14 +353,19 @@ def _adaptive_grid(
     return likelihood, Grid(nodes, np.broadcast_to(cell, nodes.shape), curves, fits), shape == FINE
 
 
+def _effective_cells(grid: Grid) -> float:
+    """Return how many cells share the posterior mass."""
+    mass = np.exp(grid.log_masses - grid.log_masses.max())
+    return float(mass.sum() ** 2 / (mass**2).sum())
+
+
 def _refine(likelihood: Likelihood, equation: Equation, grid: Grid, deadline: float) -> Grid:
     """Return the grid with cells that matter, and those beside them, cut in four until enough of them share the mass.
 
     A ridge may be narrower than a cell, and oblique to the grid. After ``deadline`` nothing is cut.
     """
     for _ in range(MAX_CUTS):
-        mass = np.exp(grid.log_masses - grid.log_masses.max())
-        if mass.sum() ** 2 / (mass**2).sum() > MIN_CELLS or time.perf_counter() > deadline:
+        if _effective_cells(grid) > MIN_CELLS or time.perf_counter() > deadline:
             break
         relevant = grid.log_densities > grid.log_densities.max() - EDGE
         distance = np.abs(grid.nodes[:, None] - grid.nodes[None, relevant])

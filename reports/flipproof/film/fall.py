@@ -1,4 +1,4 @@
-"""Whether a bottle already falls freely before its release, judged without an equation of its water.
+"""Whether a bottle falls freely before its release or after its touch, judged without an equation of its water.
 
 Whatever the water does along the bottle, n . cap = n . base = n . C_M, n being the direction across it; and in flight
 C_M moves along a parabola. So the clicks across the bottle between release and touch predict those before:
@@ -7,11 +7,13 @@ C_M moves along a parabola. So the clicks across the bottle between release and 
 
 A hand that carries the bottle adds g to its fall, g tau^2/2 upwards at a time tau before the release. The share of this
 that the clicks show, with its standard error, is 1 or more in a hand, and 0 where the bottle already falls: the release
-is then too late. A touch cannot be checked this way: a bottle may go on over the rim that stands.
+is then too late. The same film backwards shows whether it still falls after its touch, which is then too early. Since a
+bottle may go on over the rim that stands, ``LATER`` is looked at, too.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -29,6 +31,10 @@ MAX_SECONDS: Final = 0.2
 """Seconds before the release from which frames are used: no hand is steady for longer."""
 
 
+LATER: Final = 0.05
+"""Time after a touch at which the bottle must still fall [s]."""
+
+
 class Share(NamedTuple):
     """What the frames before a release show of a hand.
 
@@ -44,6 +50,13 @@ class Share(NamedTuple):
     def falls(self) -> bool:
         """Whether the bottle falls freely there."""
         return self.share < MAX_FREE_SHARE and self.misfit < 4.0
+
+
+def fall_after(film: Film, release: float, touch: float, noise: float) -> Share | None:
+    """Return the free fall seen after a touch, and still ``LATER``; None if there is none, or too few frames."""
+    backwards = replace(film, t=-film.t[::-1], values=film.values[:, ::-1].copy(), lines=film.lines[::-1])
+    shares = [hand_share(backwards, -later, -release, noise) for later in (touch, touch + LATER)]
+    return shares[1] if all(share is not None and share.falls for share in shares) else None
 
 
 def hand_share(film: Film, release: float, touch: float, noise: float) -> Share | None:

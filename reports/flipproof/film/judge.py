@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from scipy.stats import gaussian_kde, norm
 
 from flipproof.film.estimate import DRAWS, MAX_RATE, SCALE, UNITS, Estimate, exchange_gain, shortest, third_differences
-from flipproof.film.fall import hand_share
+from flipproof.film.fall import LATER, fall_after, hand_share
 from flipproof.film.likelihood import GRAVITY
 from ode_reference.solver import WATERS
 from slicemodel.trajectory import FloatArray
 
-Verdict = Literal["told", "bounded above", "bounded below", "cannot tell", "not in this equation"]
+Verdict = Literal["told", "held", "bounded above", "bounded below", "cannot tell", "not in this equation"]
 
 INDISTINCT: Final = 3.0
 """Difference of the logarithms of evidence up to which two equations are said to do equally well."""
@@ -46,6 +46,12 @@ In 1080 simulated films, every third with twelve points missing, hands and bad c
 
 MAX_GAP: Final = 3.5
 """Frames over which an end may move unseen beside a jump."""
+
+OTHER_BOTTLE: Final = 0.1
+"""Share by which the points may lie farther apart, or nearer, than the bottle is long, without a remark."""
+
+UNITS_OF_LENGTH: Final = (1e-3, 1e-2, 0.1, 10.0, 1e2, 1e3)
+"""Lengths over the true ones where another unit was meant."""
 
 SHOWN: Final = ("gamma", "restitution", "omega0", "theta0", "release", "touch", "tilt", "g", "noise", "length")
 
@@ -84,8 +90,19 @@ class Assessment:
 
     @cached_property
     def theta(self) -> FloatArray:
-        """The measured angle with its turns counted, shape (P,); NaN where there is none."""
-        return nearest_turn(self.estimate.film.angle, self.fitted[0])
+        """The measured angle with its turns counted, shape (P,); NaN where there is none.
+
+        In flight a turn is the fitted one; before and after, each angle is the nearest to that of the frame beside it.
+        """
+        flying = self.estimate.flying
+        theta = nearest_turn(self.estimate.film.angle, self.fitted[0])
+        frames = np.flatnonzero(~np.isnan(theta))
+        inside = np.flatnonzero(flying[frames])
+        if len(inside):
+            first, last = inside[0], inside[-1]
+            theta[frames[last:]] = np.unwrap(theta[frames[last:]])
+            theta[frames[first::-1]] = np.unwrap(theta[frames[first::-1]])
+        return theta
 
     @cached_property
     def residuals(self) -> FloatArray:
@@ -143,6 +160,45 @@ class Assessment:
         return () if self.sliced else ("restitution",)
 
     @property
+    def held(self) -> dict[str, tuple[float, str]]:
+        """What is held: the parameter, its value [as of ``UNITS``] and the option that holds it."""
+        held = self.estimate.held
+        values: dict[str, tuple[float | None, str]] = {
+            "release": (self.estimate.likelihood.held.release, "--release"),
+            "touch": (held.touch, "--landing"),
+            "noise": (held.noise, "--noise"),
+            "tilt": (0.0 if held.tilt else None, "--hold tilt"),
+            "g": (GRAVITY if held.scale else None, "--hold scale"),
+        }
+        return {name: (value, option) for name, (value, option) in values.items() if value is not None}
+
+    @property
+    def held_words(self) -> str:
+        """What to look at among the options, after a semicolon; nothing if nothing is held."""
+        options = [option for _, option in self.held.values()]
+        options += ["--table-height"] if self.estimate.held.table is not None else []
+        return f"; or a value that is held is wrong: {', '.join(options)}" if options else ""
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The parameters that this film and equation have: no touch where the record ends before it."""
+        estimate = self.estimate
+        seen = estimate.touched and estimate.likelihood.planar
+        return tuple(
+            name
+            for name in SHOWN
+            if name in estimate.draws
+            and (name != "touch" or seen)
+            and (name != "theta0" or estimate.film.quantity != "omega")
+        )
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a parameter: the noise is in that of the film's values."""
+        if name == "noise" and self.estimate.film.quantity != "points":
+            return "rad" if self.estimate.film.quantity == "theta" else "rad/s"
+        return UNITS[name]
+
+    @property
     def sliced(self) -> bool:
         """Whether the equation has slices, however many: ``WATERS`` have none, or infinitely many."""
         return self.estimate.solver not in WATERS
@@ -156,7 +212,7 @@ class Assessment:
     @property
     def explained(self) -> bool:
         """Whether noise alone explains the size and order of the residuals, and no other equation is far likelier."""
-        if self.log_deficit > OUTDONE or not self.falls:
+        if self.log_deficit > OUTDONE or not self.falls or self.estimate.rugged:
             return False
         spread = 5.0 / math.sqrt(max(4, len(self.residuals)))
         return self.runs > 0.005 and self.noise <= max(self.own_noise, 1e-12) * (1.0 + spread)
@@ -167,6 +223,10 @@ class Assessment:
         """Return whether the data determine a parameter, bound it on one side, or do neither."""
         if name in self.unused:
             return "not in this equation"
+        if name in self.held:
+            return "held"
+        if self.estimate.rugged and name in ("gamma", "restitution"):
+            return "cannot tell"
         low, high = self.estimate.interval(name)
         if name == "restitution":
             if high - low > 0.6 or (low < 0.02 and high > 0.98):
@@ -183,6 +243,12 @@ class Assessment:
 
     def check(self) -> None:
         """Refuse what cannot be right: raise UnsoundError, one line that says what to click again."""
+        try:
+            self._check()
+        except UnsoundError as error:
+            raise UnsoundError(f"{error}{self.held_words}") from None
+
+    def _check(self) -> None:
         estimate, x = self.estimate, self.estimate.fit.x
         film, held = estimate.film, estimate.held
         if not estimate.complete:
@@ -197,8 +263,8 @@ class Assessment:
             advice = "look for an origin or a stick that moves, or exchanged ends"
             if clicked < 8:
                 advice = (
-                    "click more frames of the flight, or see whether --scenario "
-                    f"({estimate.throw.fill_fraction:.0%} full, {state}) is this bottle"
+                    "click more frames of the flight, or see whether this is the bottle that is assumed "
+                    f"({estimate.throw.fill_fraction:.0%} full, {state}: --scenario)"
                 )
             raise UnsoundError(
                 f"{film.label}: {estimate.solver} fits {len(self.residuals)} of {total} clicked frames as a flight, of "
@@ -229,11 +295,15 @@ class Assessment:
             low, high = estimate.interval("g", 0.9999)
             if not held.scale and not low - SCALE_ERROR * GRAVITY <= GRAVITY <= high + SCALE_ERROR * GRAVITY:
                 gravity = estimate.best["g"]
+                lengths, times = gravity / GRAVITY, math.sqrt(GRAVITY / max(gravity, 1e-9))
+                units = [math.isclose(lengths, factor, rel_tol=0.05) for factor in UNITS_OF_LENGTH]
+                stick = "name another --length-unit" if any(units) else "click the calibration stick again"
+                clock = "--time-unit ms" if math.isclose(times, 1e3, rel_tol=0.05) else "the recording's frame rate"
                 raise UnsoundError(
-                    f"{film.label}: g = {gravity:.3g} m/s^2 in the picture, not {GRAVITY:g}: is the bottle that of "
-                    f"--scenario ({estimate.throw.fill_fraction:.0%} full)? click the calibration stick again (lengths "
-                    f"are {gravity / GRAVITY:.3g} of the true ones), or name the recording's frame rate (times are "
-                    f"{math.sqrt(GRAVITY / max(gravity, 1e-9)):.3g} of the true ones); y points up"
+                    f"{film.label}: g = {gravity:.3g} m/s^2 in the picture, not {GRAVITY:g}: {stick} (lengths are "
+                    f"{lengths:.3g} of the true ones), or name {clock} (times are {times:.3g} of the true ones), or "
+                    "see whether its times leave out frames, or it is another bottle than is assumed "
+                    f"({estimate.throw.fill_fraction:.0%} full: --scenario); y points up"
                 )
             if self.noise > 0.1 * estimate.best["length"]:
                 raise UnsoundError(
@@ -242,6 +312,7 @@ class Assessment:
                 )
             self._check_origin()
             self._check_release()
+            self._check_touch()
         if film.quantity != "omega":
             self._check_rates()
 
@@ -269,8 +340,25 @@ class Assessment:
                 f"{estimate.film.label}: {1e3 * hand.seconds:.0f} ms before the release at {release:.3f} s the bottle "
                 "falls freely by its clicks alone: the flight begins earlier, and no fit was found that says so: does "
                 "the film begin after the release, does another equation hold (fit it beside --model free-flight), or "
-                f"is it another bottle than that of --scenario ({estimate.throw.fill_fraction:.0%} full)? click the "
-                "frames there again, or give --release"
+                f"is it another bottle than is assumed ({estimate.throw.fill_fraction:.0%} full: --scenario)? click "
+                "the frames there again, or give --release"
+            )
+
+    def _check_touch(self) -> None:
+        """Refuse a touch after which the bottle still falls freely."""
+        estimate = self.estimate
+        release, touch = estimate.interval("release")[1], estimate.interval("touch")[1]
+        if not estimate.touched or not release < touch:
+            return
+        fall = fall_after(estimate.film, release, touch, max(self.own_noise, 1e-6))
+        if fall is not None:
+            raise UnsoundError(
+                f"{estimate.film.label}: {1e3 * (fall.seconds + LATER):.0f} ms after the touch at {touch:.3f} s the "
+                "bottle still falls freely by its clicks alone: the flight ends later, and no fit was found that says "
+                "so: are cap and base exchanged from there on, does another equation hold (fit it beside --model "
+                "free-flight), or is it another bottle than is assumed "
+                f"({estimate.throw.fill_fraction:.0%} full: --scenario)? click the frames there again, or give "
+                "--landing"
             )
 
     def _check_rates(self) -> None:
@@ -313,15 +401,7 @@ class Assessment:
             f"{int((inside & ~film.clicked.all(axis=0)).sum())} with a point missing, "
             + (f"clicks doubted in lines {', '.join(map(str, doubted))}" if doubted else "no click doubted")
         ]
-        for name in SHOWN:
-            if name not in estimate.draws or (film.quantity == "omega" and name == "theta0"):
-                continue
-            if name == "touch" and not (estimate.touched and estimate.likelihood.planar):
-                continue
-            if name == "release" and estimate.likelihood.held.release is not None:
-                lines.append(f"  {name:12} {estimate.likelihood.held.release:.6g} s, held")
-                continue
-            lines.append(f"  {name:12} {self.number(name)}{self._remark(name)}")
+        lines += [f"  {name:12} {self.number(name)}{self._remark(name)}" for name in self.shown]
         correlation = (
             float(np.corrcoef(estimate.draws["gamma"], estimate.draws["release"])[0, 1])
             if estimate.held.release is None
@@ -341,20 +421,22 @@ class Assessment:
             return "–"
         estimate = self.estimate
         low, high = estimate.interval(name)
-        factor, unit = 1.0, UNITS[name]
-        if name == "noise":
-            factor, unit = {"points": (1e3, "mm"), "theta": (1.0, "rad"), "omega": (1.0, "rad/s")}[
-                estimate.film.quantity
-            ]
+        factor, unit = 1.0, self.unit(name)
+        if name == "noise" and unit == "m":
+            factor, unit = 1e3, "mm"
+        if name in self.held:
+            return f"{factor * self.held[name][0]:.6g} {unit}".rstrip()
         width = factor * (high - low)
         decimals = min(9, max(0, 1 - math.floor(math.log10(width)))) if width > 0 else 6
         numbers = [f"{factor * value:.{decimals}f}" for value in (estimate.best[name], low, high)]
         return f"{numbers[0]} [{numbers[1]}, {numbers[2]}] {unit}".rstrip()
 
     def _remark(self, name: str) -> str:
-        verdict = self.verdict(name)
+        verdict, bottle = self.verdict(name), self.estimate.throw.bottle.length
+        if name == "length" and abs(self.estimate.best["length"] / bottle - 1.0) > OTHER_BOTTLE:
+            return f"  the bottle that is assumed is {bottle:g} m long: click its ends, or name it by --scenario"
         return {
-            "told": "", "cannot tell": "  the film cannot tell it",
+            "told": "", "held": ", held", "cannot tell": "  the film cannot tell it",
             "bounded above": "  bounded from above only: 0 is not excluded",
             "bounded below": "  bounded from below only", "not in this equation": "  not in this equation",
         }[verdict]  # fmt: skip
@@ -375,13 +457,26 @@ class Assessment:
                 f"the equation does not explain the film: it fits {int(self.flying.sum())} frames alone, as a fall "
                 f"with g = {self.estimate.best['g']:.2g} m/s^2; no interval is promised to hold the truth"
             )
+        if self.estimate.rugged:
+            return (
+                "next to this gamma and restitution the flight fits far worse, as with little drag and many slices: a "
+                "better pair may have been missed, and no interval is promised to hold the truth"
+            )
+        if self.runs > 0.005 and "noise" in self.held:
+            factor = 1e3 if self.unit("noise") == "m" else 1.0
+            unit = "mm" if factor > 1.0 else self.unit("noise")
+            return (
+                f"the noise that is held is {self.noise / self.own_noise:.2g} times the scatter of the clicks, "
+                f"{factor * self.own_noise:.2g} {unit}: see whether --noise is right; no interval is promised to hold "
+                "the truth"
+            )
         unit = "rad/s" if self.estimate.film.quantity == "omega" else "degrees"
         order = (
             "" if self.runs > 0.005 else f", in waves that chance leaves once in {1 / max(self.runs, 1e-9):.2g} films"
         )
         return (
             f"the equation does not explain the flight: a misfit of {self.misfit} {unit} that no drag and no "
-            f"restitution explains{order}; no interval is promised to hold the truth"
+            f"restitution explains{order}{self.held_words}; no interval is promised to hold the truth"
         )
 
 

@@ -68,6 +68,7 @@ class Film:
     quantity : what ``values`` are
     lines : (P,) - lines of the file, 0 where a frame has none
     notes : how the file was read
+    release : float or None - [s], if the file states it
     """
 
     label: str
@@ -76,6 +77,7 @@ class Film:
     quantity: Quantity
     lines: NDArray[np.int64]
     notes: tuple[str, ...] = ()
+    release: float | None = None
 
     def names(self, count: int) -> tuple[str, ...]:
         """Return the names of the inner parameters, with ``count`` motions of a hand."""

@@ -12,12 +12,10 @@ from matplotlib.figure import Figure
 
 from flipproof.figures.style import draw, new_figure, solver_style, styled
 from flipproof.film.clip import SCHEMA, schema_comments, smoothed_rate
-from flipproof.film.estimate import UNITS
-from flipproof.film.judge import SHOWN, Assessment, compared
+from flipproof.film.judge import Assessment, compared
 from flipproof.frame.columns import rows_csv
 from flipproof.output.folder import write_text
 from flipproof.output.templating import environment
-from slicemodel.trajectory import FloatArray
 
 MEASURED: Final = {"color": "#000000", "marker": ".", "linestyle": "none", "markersize": 3.0, "zorder": 5}
 DOUBTED: Final = {"color": "#d55e00", "marker": "x", "linestyle": "none", "markersize": 6.0, "zorder": 6}
@@ -28,12 +26,10 @@ def track_csv(assessment: Assessment) -> str:
     estimate = assessment.estimate
     film, t, (theta_fit, omega_fit) = estimate.film, estimate.film.t, assessment.fitted
     inside = estimate.flying
-    release, touch = estimate.best["release"], estimate.best["touch"]
+    release, touch = estimate.best["release"], estimate.best["touch"] if "touch" in assessment.shown else np.nan
     points = np.full((2, len(t), 2), np.nan)
     misses, doubted = np.full((2, len(t)), np.nan), np.zeros((2, len(t)), dtype=np.bool_)
     theta = assessment.theta
-    before_release = np.where(t < estimate.fit.x[0], theta_fit, np.nan)
-    theta = np.where(np.isnan(before_release) & ~inside, _unwrapped(film.angle, theta), theta)
     if film.quantity == "points":
         points, doubted = film.values, estimate.doubted
         _, _, residuals = estimate.likelihood.per_click(estimate.curve, estimate.fit.x)
@@ -45,14 +41,6 @@ def track_csv(assessment: Assessment) -> str:
         *doubted.astype(int), inside.astype(int), (t - release) / (touch - release), film.lines,
     )  # fmt: skip
     return schema_comments() + rows_csv(list(SCHEMA), zip(*columns, strict=True), digits=None)
-
-
-def _unwrapped(angle: FloatArray, theta: FloatArray) -> FloatArray:
-    """Return angles with turns counted from frame to frame."""
-    finite = ~np.isnan(angle)
-    unwrapped = theta.copy()
-    unwrapped[finite] = np.unwrap(theta[finite])
-    return unwrapped
 
 
 @styled
@@ -127,13 +115,14 @@ def summary(assessments: Sequence[Assessment], provenance: Mapping[str, str]) ->
 
 def _fit(assessment: Assessment) -> dict[str, Any]:
     estimate = assessment.estimate
-    names = [name for name in SHOWN if name in estimate.draws and name not in assessment.unused]
+    names = [name for name in assessment.shown if name not in assessment.unused]
     return {
         "model": estimate.solver,
         "slices": estimate.throw.n_slices if assessment.sliced else None,
         "parameters": [
-            {"name": name, "unit": UNITS[name], "value": estimate.best[name], "low": estimate.interval(name)[0],
-             "high": estimate.interval(name)[1], "verdict": assessment.verdict(name)} for name in names
+            {"name": name, "unit": assessment.unit(name), "value": estimate.best[name],
+             "low": estimate.interval(name)[0], "high": estimate.interval(name)[1],
+             "verdict": assessment.verdict(name)} for name in names
         ],
         "correlation": np.corrcoef(
             [estimate.draws[name] for name in ("gamma", "restitution", "omega0", "release")]

@@ -1,5 +1,6 @@
 """Films of known truth: the estimate holds it, says what it cannot tell, and refuses what cannot be right."""
 
+import re
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 
 from flipproof.cli.main import main
-from flipproof.film.clip import SCHEMA, read_film, smoothed_rate
+from flipproof.film import page
+from flipproof.film.clip import SCHEMA, read_film, read_table, smoothed_rate
 from flipproof.film.estimate import NoFlightError, estimate, exchange_gain, exchanged, settle, shortest
-from flipproof.film.fall import hand_share
+from flipproof.film.fall import fall_after, hand_share
 from flipproof.film.judge import EXCHANGED, Assessment, UnsoundError, shared_draws
 from flipproof.film.likelihood import Film, Held
 from flipproof.film.measured import hold, read_measured
@@ -203,6 +205,97 @@ def test_what_is_known_is_held():
     assert found.best["g"] == pytest.approx(9.81, abs=1e-4)
     low, high = found.interval("gamma", 0.999)
     assert low <= 6.0 <= high
+
+
+def test_what_is_held_is_said_to_be_held_and_blamed(poor):
+    """A wrong --noise or --hold was put down to the equation, to the origin or to the clicks."""
+    _, judged = poor
+    held = Held(touch=0.75, tilt=True, scale=True, noise=4e-3)
+    wrong = Assessment(replace(judged.estimate, held=held))
+    lines = "\n".join(wrong.lines())
+    for words in ("touch +0.75 s", "tilt +0 deg", "g +9.81 m/s\\^2", "noise +4 mm"):
+        assert re.search(f"^  {words}, held$", lines, re.MULTILINE), words
+    options = "--landing, --noise, --hold tilt, --hold scale"
+    assert wrong.held_words == f"; or a value that is held is wrong: {options}"
+    assert {one["verdict"] for one in page.summary([wrong], {})["fits"][0]["parameters"]} >= {"held", "told"}
+    draws = {**judged.estimate.draws, "noise": np.full(8000, 4e-3)}
+    loud = Assessment(replace(wrong.estimate, draws=draws))
+    assert not loud.explained
+    assert loud.conclusion.startswith("the noise that is held is ")
+    with pytest.raises(UnsoundError, match=f"or a value that is held is wrong: {options}"):
+        Assessment(replace(wrong.estimate, complete=False)).check()
+
+
+def test_turns_are_counted_from_frame_to_frame_outside_the_flight(quick):
+    """A bottle that lies in the hand for long was shown to turn by 2 pi between two frames."""
+    _, judged = quick
+    film, rest = judged.estimate.film, 150
+    early = film.t[0] - np.arange(rest, 0, -1) / 240
+    long = replace(
+        film, t=np.concatenate((early, film.t)), lines=np.arange(rest + len(film.t)),
+        values=np.concatenate((np.repeat(film.values[:, :1], rest, axis=1), film.values), axis=1),
+    )  # fmt: skip
+    theta = Assessment(replace(judged.estimate, film=long)).theta
+    assert np.abs(np.diff(theta)).max() < 0.5
+    np.testing.assert_array_equal(theta[rest:], judged.theta)
+
+
+def test_an_angle_of_a_track_begins_at_its_release(quick, tmp_path):
+    """All frames of the hand were taken for flight, and omega_0 for 0."""
+    _, judged = quick
+    (tmp_path / "track.csv").write_text(page.track_csv(judged), encoding="utf-8")
+    film = read_table(tmp_path / "track.csv", "theta")
+    assert film.release == pytest.approx(judged.estimate.best["release"], abs=1e-9)
+    np.testing.assert_allclose(film.t, judged.estimate.film.t[judged.estimate.flying], rtol=0, atol=1e-12)
+    assert film.notes == ("theta of a track.csv, from its release to its touch",)
+    assert read_table(tmp_path / "track.csv").release is None  # points have their own
+    angles = Assessment(replace(judged.estimate, film=film))
+    assert (angles.unit("noise"), judged.unit("noise")) == ("rad", "m")
+
+
+def test_a_touch_that_is_not_in_the_film_is_nowhere(quick, tmp_path):
+    _, judged = quick
+    ended = Assessment(replace(judged.estimate, touched=False))
+    assert "touch" in judged.shown
+    assert "touch" not in ended.shown
+    assert not any(line.startswith("  touch") for line in ended.lines())
+    assert "touch" not in {one["name"] for one in page.summary([ended], {})["fits"][0]["parameters"]}
+    (tmp_path / "track.csv").write_text(page.track_csv(ended), encoding="utf-8")
+    header, *rows = [line for line in (tmp_path / "track.csv").read_text().splitlines() if line[0] != "#"]
+    at = header.split(",").index("t_over_T")
+    assert {row.split(",")[at] for row in rows} == {""}
+
+
+def test_a_touch_after_which_the_bottle_still_falls_is_refused(quick):
+    """Fifteen frames of a flight of 83 were fitted, and said to be explained."""
+    made, judged = quick
+    one, touch = judged.estimate, made.truth["release"] + 0.3
+    assert fall_after(one.film, one.best["release"], touch, 0.5e-3) is None
+    fall = fall_after(one.film, one.best["release"], touch - 0.15, 0.5e-3)
+    assert fall is not None
+    assert abs(fall.share) < 0.3
+    shift = one.draws["touch"] - 0.15
+    early = replace(one, draws={**one.draws, "touch": shift}, likelihood=one.likelihood.replaced(touch=touch - 0.15))
+    with pytest.raises(UnsoundError, match=r"ms after the touch at 0\.\d+ s the bottle still falls freely"):
+        Assessment(early).check()
+
+
+def test_a_sharp_peak_among_others_promises_nothing(quick):
+    """With little drag a film said gamma = 1.1039 [1.1027, 1.1051] of 1.0, "the equation explains the flight"."""
+    _, judged = quick
+    sharp = Assessment(replace(judged.estimate, rugged=True))
+    assert judged.explained
+    assert not sharp.explained
+    assert sharp.verdict("gamma") == sharp.verdict("restitution") == "cannot tell"
+    assert "a better pair may have been missed" in sharp.conclusion
+
+
+def test_points_apart_by_another_length_than_the_bottle_are_remarked(quick):
+    _, judged = quick
+    throw = replace(judged.estimate.throw, bottle=replace(THROW.bottle, length=0.4))
+    other = Assessment(replace(judged.estimate, throw=throw))
+    assert any(line.startswith("  length") and "assumed is 0.4 m long" in line for line in other.lines())
+    assert not any("m long" in line for line in judged.lines())
 
 
 def test_another_equation_is_not_said_to_explain(eq8):
