@@ -49,6 +49,9 @@ def check_shape(traits: Traits) -> CheckGenerator:
     )
 
 
+SINGLE: Final = 5e-7
+"""Error of omega at the release below which it may be the rounding of single precision: four spacings of it."""
+
 OTHER: Final = replace(SMOOTH, theta0=-0.7, omega0=-7.3)
 """A short throw, released at another angle and spinning slower, the other way round."""
 
@@ -97,6 +100,8 @@ def check_start(traits: Traits) -> CheckGenerator:
             ):
                 wrong = "J_0 omega_0 is divided by a J that is not that of the start, as the answered inertia shows"
             hint = f"omega(0) is off by as much at any times asked: {wrong}"
+            if traits.precision == "float64" and errors["omega"] < SINGLE:
+                hint += "; so small an error is the rounding of single precision: keep places and J in float64"
     turns = (answer.theta[0] - throw.theta0) / (2 * np.pi)
     if worst == "theta" and round(turns) and abs(turns - round(turns)) < 1e-6:
         hint = "theta is off by whole turns: do not wrap it"

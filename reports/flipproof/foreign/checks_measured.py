@@ -202,7 +202,10 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         for name, throw in CALM.items() if not advice else ():
             orders_without = _orders(traits, (yield from _changes_before(traits, throw, levels)))
             if orders_without and min(orders_without.values()) >= required:
-                advice = f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}"
+                advice = (
+                    f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}, and whether an "
+                    "iteration with it converges"
+                )
                 break
     low, right = ([name for name, order in orders.items() if (order < required) == below] for below in (True, False))
     if low and right:

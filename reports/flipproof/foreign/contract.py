@@ -335,7 +335,9 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
     if not np.isin(arrays["end"], (-1.0, 1.0)).all():
         raise AnswerError("impacts.end holds other numbers than 1 (base) and -1 (cap)")
     if count and not (arrays["slice"].min() >= 0 and arrays["slice"].max() < n_slices):
-        raise AnswerError(f"impacts.slice leaves [0, {n_slices - 1}]")
+        raise AnswerError(
+            f"impacts.slice leaves [0, {n_slices - 1}]: number slices from 0, and keep no impacts of another question"
+        )
     broken = arrays["slice"] % 1.0 != 0.0
     if broken.any():
         raise AnswerError(

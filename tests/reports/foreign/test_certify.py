@@ -766,6 +766,8 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("cash_karp_digits_swapped", "ice", "look for weights that do not add up to 1"),
         ("scalar_omega_of_the_last_step", "angle", "answer the omega of the same instant"),
         ("kutta3_slices_with_an_inertia_of_their_own", "definitions", "M_b (R^2/2 + L^2/12) counts 1.25 times"),
+        ("sdirk_positions_in_single_precision", "start", "the rounding of single precision: keep places and J"),
+        ("expint_two_sweeps", "order-before-impacts", "and whether an iteration with it converges"),
         (
             "position_verlet_drag_of_the_old_speed",
             "order-before-impacts",
