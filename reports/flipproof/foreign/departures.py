@@ -171,8 +171,8 @@ def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureG
         if coarse:
             if passed_over := _passed_over(traits, coarse, intervals):
                 advice = (
-                    "the slice goes on as before it: find each impact inside its step, of both ends the earliest first; "
-                    "an answer between two steps must know of an impact on its way"
+                    "the slice goes on as before it: find each impact inside its step, of both ends the earliest "
+                    "first; an answer between two steps must know of an impact on its way"
                 )
                 return passed_over, advice
             spoiled = max(spoiled, _spoiled(traits, coarse, intervals))
