@@ -348,7 +348,7 @@ class Assessment:
         """Refuse a touch after which the bottle still falls freely."""
         estimate = self.estimate
         release, touch = estimate.interval("release")[1], estimate.interval("touch")[1]
-        if not estimate.touched or not release < touch:
+        if not estimate.touched or estimate.held.touch is not None or not release < touch:
             return
         fall = fall_after(estimate.film, release, touch, max(self.own_noise, 1e-6))
         if fall is not None:
