@@ -63,7 +63,11 @@ def figure_film(assessments: Sequence[Assessment]) -> Figure:
         estimate = assessment.estimate
         style = solver_style("eq8" if estimate.solver == "midpoint" else estimate.solver, k)
         inside = estimate.flying
-        above.plot(t[inside], assessment.fitted[int(omega)][inside], label=estimate.solver, **style)
+        fitted = assessment.fitted[int(omega)][inside]
+        if not omega:  # another equation may count other turns
+            apart = (measured[inside] - fitted) / (2 * np.pi)
+            fitted = fitted + 2 * np.pi * np.rint(np.nanmedian(apart)) if np.isfinite(apart).any() else fitted
+        above.plot(t[inside], fitted, label=estimate.solver, **style)
         axes.axhline(0.0, color="#444444", linewidth=0.8)
         axes.plot(t[assessment.flying], scale * assessment.residuals, ".", color=style["color"], markersize=4)
         axes.set_title(f"{estimate.solver}: measured − fitted [{unit}]", fontsize=9, loc="left")

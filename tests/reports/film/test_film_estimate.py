@@ -240,6 +240,21 @@ def test_turns_are_counted_from_frame_to_frame_outside_the_flight(quick):
     np.testing.assert_array_equal(theta[rest:], judged.theta)
 
 
+def test_every_equation_is_drawn_on_the_turn_of_the_clicks(quick):
+    _, judged = quick
+    fit = replace(judged.estimate.fit, modes=(replace(judged.estimate.fit.modes[0], x=turned(judged.estimate.fit.x)),))
+    other = Assessment(replace(judged.estimate, fit=fit))
+    clicks, _, one, two = page.figure_film([judged, other]).axes[0].lines[:4]
+    np.testing.assert_allclose(one.get_ydata(), two.get_ydata(), rtol=0, atol=1e-9)
+    inside = judged.estimate.flying
+    assert np.nanmax(np.abs(clicks.get_ydata()[inside] - two.get_ydata())) < 0.1
+
+
+def turned(x):
+    """Return the parameters of the same flight with its angle counted from another turn."""
+    return np.concatenate((x[:1], x[1:2] + 2 * np.pi, x[2:]))
+
+
 def test_an_angle_of_a_track_begins_at_its_release(quick, tmp_path):
     """All frames of the hand were taken for flight, and omega_0 for 0."""
     _, judged = quick
