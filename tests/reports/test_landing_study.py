@@ -548,6 +548,15 @@ def test_a_throw_that_cannot_land_fails_nothing():
     assert all(figure.drawing.svg.startswith("<?xml") for figure in drawn(told.figures, SerialExecutor(), png=False))
 
 
+@pytest.mark.parametrize(("drag", "words"), [(300.0, "15 times shorter than usual"), (1e4, "drag = .* is outside")])
+def test_a_report_leaves_out_a_study_that_drag_makes_endless(drag, words):
+    """Half an hour of a report went into steps that follow drag which no water has."""
+    told = gathered(replace(THROW, drag=drag))
+    assert told.outcomes["landing"].result is None
+    assert re.search(words, told.outcomes["landing"].reason)
+    assert [note for _, note in evaluate(told)["landing"].notes]
+
+
 def test_a_folder_that_is_not_the_studys_is_refused(tmp_path):
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(SweepError, match=r"mine\.txt"):

@@ -19,17 +19,37 @@ from flipproof.chapters.landing.study import (
     Size,
     aiming,
     counting,
+    filled,
     read,
 )
 from flipproof.chapters.landing.throws import FAMILIES, Case, make_cases
 from flipproof.chapters.landing.work import Landed
 from flipproof.frame.chapter import Ask, Call, Chapter, Flights, Study
 from flipproof.frame.findings import Band, Finding, observed, regression
-from flipproof.frame.solvers import REFERENCE
+from flipproof.frame.solvers import REFERENCE, Missing
+from ode_reference.landing.flight import FLIGHT_DT
+from ode_reference.landing.land import followed
+from slicemodel.scenario import ScenarioError
+
+MAX_SHORTER: Final = 5.0
+"""Times that drag may shorten the steps of the study of a report, which takes a third of it."""
 
 
 def study(ask: Ask) -> Study[LandingStudy]:
-    """Solve for the aims, throw about them, and throw about the best of them, a wave each."""
+    """Solve for the aims, throw about them, and throw about the best of them, a wave each.
+
+    Raises Missing where drag makes the steps ``MAX_SHORTER`` times shorter, and the report as much longer.
+    """
+    water = filled(ask.throw, max(ask.work.fillings), ask.work.slices, frozen=False)
+    try:
+        shorter = FLIGHT_DT / followed(water, FLIGHT_DT)
+    except ScenarioError as error:
+        raise Missing(str(error)) from None
+    if shorter > MAX_SHORTER:
+        raise Missing(
+            f"drag stops the water so fast that every step is {shorter:.0f} times shorter than usual: "
+            "'flipproof upright' makes the study, however long it takes"
+        )
     planned = Call(aiming, (ask.throw, ask.work), "aims of the landing")
     flights = yield [planned]
     aims, unaimed = flights.answer(planned)
