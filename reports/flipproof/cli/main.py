@@ -272,7 +272,9 @@ def _print_report(report: Any, out: Path, seconds: float) -> None:
         if finding.id.startswith("difference-"):
             size = "       –" if finding.value is None else f"{finding.value:8.3%}"
             band = finding.band.size if finding.band is not None else 0.0
-            vague = f" (numerical uncertainty {100 * band:.2g}%)" if band > 0.1 * (finding.value or 0.0) > 1e-6 else ""
+            vague = (
+                f" (numerical uncertainty {100 * band:.2g}%)" if band > max(1e-4, 0.1 * (finding.value or 0.0)) else ""
+            )
             print(f"  {size}  {finding.title}{vague}")
     regressions = [finding for finding in report.findings if finding.kind == "regression"]
     for finding in report.failed:
