@@ -306,7 +306,7 @@ class Explanation:
 def explain(first_runner: Runner, second_runner: Runner, throw: Scenario) -> Explanation:
     """Place two solvers, throw the bottle with both, and split their difference.
 
-    Raises ForeignError if one of them gives no answer.
+    Raises ForeignError if one of them gives no answer, ValueError if an equation between them gives none.
     """
     first, second = place(first_runner), place(second_runner)
     a, b = (runner(ask_of(runner.traits, throw, 3, 1000)) for runner in (first_runner, second_runner))
@@ -329,7 +329,8 @@ def explain(first_runner: Runner, second_runner: Runner, throw: Scenario) -> Exp
 def shares(start: Switches, end: Switches, throw: Scenario) -> tuple[dict[str, float], float]:
     """Return the mean change of the plateau over all orders of turning the switches from ``start`` to ``end``.
 
-    With it: the largest band of a plateau from which this follows, NaN if a twin does not reach its end.
+    With it: the largest band of a plateau from which this follows, NaN if a twin does not reach its end. Raises
+    ValueError if an equation on the way does not fly the throw to its end.
     """
     differing = [f.name for f in fields(Switches) if getattr(start, f.name) != getattr(end, f.name)]
     bands: list[float] = []
@@ -337,7 +338,10 @@ def shares(start: Switches, end: Switches, throw: Scenario) -> tuple[dict[str, f
     @cache
     def plateau_of(switches: Switches) -> float:
         run = Run(switches.name, throw, {"times": times_of(throw, 1000)})
-        levels = {one: make(one).plateau for one in (run, *twins(run))}
+        flown = make(run)
+        if flown.problem:
+            raise ValueError(f"{switches.name} does not fly this throw to its end: {flown.problem}")
+        levels = {run: flown.plateau} | {twin: make(twin).plateau for twin in twins(run)}
         bands.append(band(run, levels))
         return levels[run]
 

@@ -15,7 +15,7 @@ from flipproof.chapters.solvers import LIMITS
 from flipproof.foreign.contract import ForeignError
 from flipproof.foreign.place import explain, lattice, name_of, place, shares, switches_of
 from flipproof.foreign.solving import opened
-from flipproof.frame.solvers import catalogue
+from flipproof.frame.solvers import RunResult, catalogue
 from ode_reference.switches import Switches
 from slicemodel import Scenario
 
@@ -156,6 +156,12 @@ def test_shares_sum_to_the_whole_way():
     one, other = explain(opened("eq8"), opened("free-flight"), throw).values
     assert sum(bars.values()) == pytest.approx(other - one, abs=1e-12)
     assert len(bars) == sum(a != b for a, b in zip(vars_of(start), vars_of(end), strict=True))
+
+
+def test_an_equation_that_gives_up_on_the_way_is_named(monkeypatch):
+    monkeypatch.setattr("flipproof.foreign.place.make", lambda run: RunResult(run, None, 0.0, "stalled: it is stiff"))
+    with pytest.raises(ValueError, match=r"switches:\d+ does not fly this throw to its end: stalled: it is stiff"):
+        shares(switches_of("eq8"), switches_of("free-flight"), Scenario(n_slices=4))
 
 
 def vars_of(switches: Switches):
