@@ -14,17 +14,17 @@ of 70, 56 of 60, 35 of 40, 47 of 50, 45 of 50, 47 of 50, 41 of 50, three times 4
 40 of 40, 37 of 40, twice 35 of 36, 72 of 73, 38 of 40, 42 of 42 and 35 of 40. Left out are twelve mistakes of
 ``eighteenth`` and ``nineteenth`` that an earlier author had planted, too, three that change no digit of forty random
 throws, and two solvers with their mistakes: one does not end on a throw of the suite, and the other, ``pyport``, was
-accused without any. After each list checks or advice were changed, after the last nine advice only, but for rules on
+accused without any. After each list checks or advice were changed, after the last ten advice only, but for rules on
 late impacts, on what a solver of order 1 gets wrong, which is asked again at finer steps, on impacts overlooked in long
 steps, of which low ones no longer count, on the order before impacts, which is taken at more times, and on rest speeds,
-and but for one throw, which lets slices go from the cap. The lines of six to seventeen mistakes were changed after each
-of ``twentieth`` to ``twentyfifth`` and not judged again. In ``twentyfourth`` all solvers are of free flight. All six
-right solvers of ``twentyfifth`` were accused: four answer speeds of impacts with a sign, which had to be taken before
-its mistakes could be put to the checks, and two are the paper's program, whose r_cm and J lag a step and whose slices
-at an end turn back in every step, as that program's may now. The solvers of ``twentysixth`` answer no impacts: what
-their author had read did not say what a row of them holds. The author of ``seventeenth`` also wrote the six solvers
-that he and the next author changed. A right solver whose impacts wait for its grid was accused, because three levels of
-refinement agreed by chance, until the check confirmed at finer steps what it finds.
+and but for one throw, which lets slices go from the cap. The lines of four to seventeen mistakes were changed after
+each of ``twentieth`` to ``twentyseventh`` and not judged again. In ``twentyfourth`` all solvers are of free flight. All
+six right solvers of ``twentyfifth`` were accused: four answer speeds of impacts with a sign, which had to be taken
+before its mistakes could be put to the checks, and two are the paper's program, whose r_cm and J lag a step and whose
+slices at an end turn back in every step, as that program's may now. The solvers of ``twentysixth`` answer no impacts:
+what their author had read did not say what a row of them holds. The author of ``seventeenth`` also wrote the six
+solvers that he and the next author changed. A right solver whose impacts wait for its grid was accused, because three
+levels of refinement agreed by chance, until the check confirmed at finer steps what it finds.
 """
 
 from __future__ import annotations

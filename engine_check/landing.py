@@ -48,8 +48,8 @@ ICE_STEP: Final = 1e-4
 """Steps for water and for ice [s]."""
 
 STRONGEST_DRAG: Final = 1e5
-"""Largest rate at which the drag may stop all water in a free bottle [1/s]: steps are at most the inverse of that rate,
-since beyond two of it they are unstable."""
+"""Largest rate at which the drag may stop all water in a free bottle [1/s]. A step is at most the inverse of that rate;
+from twice the inverse on it is unstable, because the drag is explicit."""
 
 TWIN: Final = 0.02
 """Share by which the touches differ that have to end alike: near an edge between outcomes a halved step may end as the

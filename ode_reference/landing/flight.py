@@ -20,6 +20,11 @@ FLIGHT_DT: Final = 2e-4
 FAR: Final = -1e4
 """Height of a table that no flight reaches [m]."""
 
+
+class NotReachedError(ValueError):
+    """A table on which the bottle does not come down from above within the duration."""
+
+
 State = tuple[FloatArray, FloatArray, FloatArray]
 
 
@@ -44,8 +49,8 @@ def fly(scenario: Scenario, table: Table, *, dt: float = FLIGHT_DT) -> Touch:
     Raises
     ------
     ValueError
-        Naming the argument, its value and the admissible values: a bottle that does not come down on the table from
-        above within the duration, drag that no step follows.
+        Naming the argument, its value and the admissible values: drag that no step follows; ``NotReachedError`` for a
+        bottle that does not come down on the table from above within the duration.
 
     Accuracy
     --------
@@ -63,14 +68,16 @@ def fly(scenario: Scenario, table: Table, *, dt: float = FLIGHT_DT) -> Touch:
             _free(state, world, begin, dt)
             room = _room(state, world)
         if room <= 0.0:
-            raise ValueError(
+            raise NotReachedError(
                 f"table.height = {table.height:g} m is not reached from above: the bottle is not over it at release, "
                 "nor when its centre of mass is highest"
             )
     q, s, w = state
     run = _loop(q, s, w, dt, scenario.duration - begin, world)
     if run.code != TOUCHED:
-        raise ValueError(f"table.height = {table.height:g} m is not reached within duration = {scenario.duration:g} s")
+        raise NotReachedError(
+            f"table.height = {table.height:g} m is not reached within duration = {scenario.duration:g} s"
+        )
     return Touch(
         scenario=scenario,
         theta=float(q[2]),

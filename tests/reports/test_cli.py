@@ -247,13 +247,17 @@ def test_the_end_of_a_report_names_vague_numbers_and_chapters_that_could_not_be_
     findings = [
         observed("difference-a-b", "a against b", 0.2, "of ω₀", band=Band(0.41, "twins")),
         observed("difference-c-d", "c against d", 0.2, "of ω₀", band=Band(1e-3, "twins")),
+        observed("difference-e-f", "e against f", 0.0, "of ω₀", band=Band(0.3, "twins")),
+        observed("difference-g-h", "g against h", 0.0, "of ω₀", band=Band(1e-9, "twins")),
         Absent("chapter-waterfall", "What each assumption costs", "stalled", "observation").finding,
         observed("paper-x", "a statement that is not judged", None),
     ]
     _print_report(SimpleNamespace(findings=findings, failed=(), summary={}), Path("r"), 1.0)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1:4] == [
+    assert lines[1:6] == [
         "   20.000%  a against b (numerical uncertainty 41%)",
         "   20.000%  c against d",
+        "    0.000%  e against f (numerical uncertainty 30%)",
+        "    0.000%  g against h",
         "Could not be made, for reasons in the evidence: What each assumption costs",
     ]

@@ -93,6 +93,7 @@ def command_land(options: argparse.Namespace) -> int:
     from flipproof.chapters.landing.study import standing
     from flipproof.chapters.landing.throws import aimed, mirrored
     from flipproof.frame.beside import beside
+    from ode_reference.landing.flight import NotReachedError
     from slicemodel import Table
 
     Table(height=0.0, restitution=options.restitution, friction=options.friction)
@@ -107,8 +108,8 @@ def command_land(options: argparse.Namespace) -> int:
     programs = list(dict.fromkeys(name.strip() for name in options.programs.split(",")))
     try:
         rows = beside(land_throw, throw, table, options.law, programs)
-    except ValueError as error:
-        if options.aim and "table.height" in str(error):
+    except NotReachedError as error:
+        if options.aim:
             words = f"--aim {options.aim}: no table meets this bottle from above when it is upright ({error})"
             raise ValueError(words) from error
         raise

@@ -56,7 +56,8 @@ EDGE: Final = 5.0
 MIN_CELLS: Final = 40
 """Effective number of cells that share the posterior mass from which on they are cut no further."""
 
-SHARP: Final = (4.0, 1e-3)
+SHARP_CELLS: Final = 4.0
+SHARP_HEIGHT: Final = 1e-3
 """Effective number of cells of the grid that has closed in, and height of one in e, below which it is a sharp peak.
 
 With little drag and noise there are many, and it may not be the highest. Of 46 films of another author, five had fewer
@@ -105,7 +106,7 @@ class Estimate:
     touched : bool - whether the record goes on after the flight
     flights : int - of the solver
     complete : bool - whether there was time for the grid to close in
-    rugged : bool - whether the grid closed in on a peak as sharp as ``SHARP``, beside which there may be a higher one
+    rugged : bool - whether the grid closed in on a sharp peak (``is_sharp``), beside which there may be a higher one
     first_guess_cost : float - of the likeliest first guess
     """
 
@@ -228,7 +229,7 @@ def _estimate_from(
     likelihood, grid, complete = _adaptive_grid(likelihood, equation, x, seconds)
     if not np.isfinite(grid.log_masses).any():
         raise NoFlightError(f"{film.label}: {solver}: no flight fits the clicks; check that y points up")
-    rugged = _effective_cells(grid) < SHARP[0] and grid.cells[:, 1].max() < SHARP[1]
+    rugged = is_sharp(grid)
     if complete:
         grid = _refine(likelihood, equation, grid, start_time + seconds)
     fits, curves = grid.fits, grid.curves
@@ -243,7 +244,7 @@ def _estimate_from(
     return Estimate(
         film=film, throw=sliced, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
         draws=draws, evidence=float(np.logaddexp.reduce(grid.log_masses) - np.log(np.arcsinh(MAX_RATE / SCALE))),
-        touched=bool(likelihood.touch < film.t[-1]), flights=n_flights, complete=complete, rugged=bool(rugged),
+        touched=bool(likelihood.touch < film.t[-1]), flights=n_flights, complete=complete, rugged=rugged,
     )  # fmt: skip
 
 
@@ -357,6 +358,11 @@ def _effective_cells(grid: Grid) -> float:
     """Return how many cells share the posterior mass."""
     mass = np.exp(grid.log_masses - grid.log_masses.max())
     return float(mass.sum() ** 2 / (mass**2).sum())
+
+
+def is_sharp(grid: Grid) -> bool:
+    """Return whether a grid that has closed in did so on a sharp peak: ``SHARP_CELLS``, each below ``SHARP_HEIGHT``."""
+    return _effective_cells(grid) < SHARP_CELLS and bool(grid.cells[:, 1].max() < SHARP_HEIGHT)
 
 
 def _refine(likelihood: Likelihood, equation: Equation, grid: Grid, deadline: float) -> Grid:

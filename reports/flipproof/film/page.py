@@ -64,9 +64,9 @@ def figure_film(assessments: Sequence[Assessment]) -> Figure:
         style = solver_style("eq8" if estimate.solver == "midpoint" else estimate.solver, k)
         inside = estimate.flying
         fitted = assessment.fitted[int(omega)][inside]
-        if not omega:  # another equation may count other turns
-            apart = (measured[inside] - fitted) / (2 * np.pi)
-            fitted = fitted + 2 * np.pi * np.rint(np.nanmedian(apart)) if np.isfinite(apart).any() else fitted
+        turned = (assessment.theta - best.theta)[inside & ~np.isnan(best.theta)]
+        if not omega and len(turned):  # another equation may count other turns
+            fitted = fitted - np.median(turned)
         above.plot(t[inside], fitted, label=estimate.solver, **style)
         axes.axhline(0.0, color="#444444", linewidth=0.8)
         axes.plot(t[assessment.flying], scale * assessment.residuals, ".", color=style["color"], markersize=4)

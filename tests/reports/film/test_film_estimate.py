@@ -4,6 +4,7 @@ import re
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import film_simulator
 import numpy as np
@@ -12,7 +13,16 @@ import pytest
 from flipproof.cli.main import main
 from flipproof.film import page
 from flipproof.film.clip import SCHEMA, read_film, read_table, smoothed_rate
-from flipproof.film.estimate import NoFlightError, estimate, exchange_gain, exchanged, settle, shortest
+from flipproof.film.estimate import (
+    Grid,
+    NoFlightError,
+    estimate,
+    exchange_gain,
+    exchanged,
+    is_sharp,
+    settle,
+    shortest,
+)
 from flipproof.film.fall import fall_after, hand_share
 from flipproof.film.judge import EXCHANGED, Assessment, UnsoundError, shared_draws
 from flipproof.film.likelihood import Film, Held
@@ -293,6 +303,14 @@ def test_a_touch_after_which_the_bottle_still_falls_is_refused(quick):
     early = replace(one, draws={**one.draws, "touch": shift}, likelihood=one.likelihood.replaced(touch=touch - 0.15))
     with pytest.raises(UnsoundError, match=r"ms after the touch at 0\.\d+ s the bottle still falls freely"):
         Assessment(early).check()
+
+
+@pytest.mark.parametrize(("height", "width", "sharp"), [(1e-4, 0.3, True), (1e-4, 3.0, False), (1e-2, 0.3, False)])
+def test_a_grid_whose_mass_lies_in_a_few_low_cells_is_a_sharp_peak(height, width, sharp):
+    axis = np.arange(-4.0, 5.0)
+    nodes = np.array([(x, y) for x in axis for y in axis])
+    fits = [SimpleNamespace(evidence=-0.5 * float(node @ node) / width**2) for node in nodes]
+    assert is_sharp(Grid(nodes * height, np.full(nodes.shape, height), [], fits)) is sharp
 
 
 def test_a_sharp_peak_among_others_promises_nothing(quick):

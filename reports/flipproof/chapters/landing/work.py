@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from flipproof.sweep.work import Row, Throw, scenario_of
+from ode_reference.landing.flight import NotReachedError
 from slicemodel import Outcome, Scenario, Table, Touch
 from slicemodel.observables import centre_of_mass, centre_of_mass_at_rest, toppling_angle
 from slicemodel.scenario import ScenarioError
@@ -75,9 +76,7 @@ def make_landing(program: str, settings: Mapping[str, Any], throw: Throw) -> Lan
         return Landed(status="impossible", reason=str(error))
     try:
         touch = flown(scenario, table.height)
-    except ScenarioError as error:
-        return Landed(status="failed", reason=str(error))
-    except ValueError as error:
+    except NotReachedError as error:
         return Landed(status="missed", reason=str(error))
     except Exception as error:
         return Landed(status="failed", reason=f"{type(error).__name__}: {error}")
