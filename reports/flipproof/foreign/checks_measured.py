@@ -515,7 +515,12 @@ def check_restitution(traits: Traits) -> CheckGenerator:
     wrong = [r for r in rebounds if not r.holds]
     worst = max(wrong or rebounds, key=lambda r: abs(r.restitution - RESTITUTION) - r.room)
     expected, observed, advice = f"e = {RESTITUTION} within {worst.room:.2g}", f"e = {worst.restitution:.4f}", ""
-    if not wrong:
+    stuck = "" if wrong else (yield from _stuck(traits))
+    if stuck:
+        expected += f", for slow impacts, too: a rest begins below omega_0 L / {1 / MAX_REST:.0f}"
+        observed, where = f"none where a slice would leave {stuck}", "slices let go near the ends, no weight, no drag"
+        advice = "look at the speed below which a slice rests on its end"
+    elif not wrong:
         speeds = [r.speed for r in rebounds]
         observed += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
         where = f"{len(rebounds)} first impacts"
@@ -537,7 +542,48 @@ def check_restitution(traits: Traits) -> CheckGenerator:
         if {r.end for r in wrong} == {"cap"} and any(r.end == "base" for r in rebounds):
             advice += "; right at the base: look at e at the cap, and at the slices that rest on the base "
             advice += "when one strikes the cap, which take part in that impact"
-    return Observation(holds=not wrong, expected=expected, observed=observed, where=where, advice=advice, facts=facts)
+    return Observation(
+        holds=not wrong and not stuck, expected=expected, observed=observed, where=where, advice=advice, facts=facts
+    )
+
+
+MAX_REST: Final = 1e-4
+"""Speed after an impact below which a slice may rest on its end, fraction of omega_0 L."""
+
+SLOW: Final = 3e-3 * 2.0 ** np.arange(6)
+"""Speeds of slow impacts on the base, fraction of omega_0 L; those on the cap are a third faster."""
+
+
+def _stuck(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], str]:
+    """Return which end a slice does not leave after a slow impact, and at what speed it should; empty if it leaves.
+
+    Without weight and drag, a slice at x from the centre of light water that fills both ends alike is thrown outward at
+    omega^2 x in every equation of the ladder. Let go at d from its end, it strikes with v = omega sqrt(2 x d) after
+    v / (omega^2 x), and is e^2 d away at the middle of its rebound. The impact of another slice gives the tube no more
+    than a hundredth of its own speed. A rebound twice as fast has to be right within a twentieth: long steps that miss
+    one rebound would bend the next.
+    """
+    shares = np.stack([SLOW, 4 / 3 * SLOW], axis=1)
+    throw = replace(throw_of(20.0), n_slices=shares.size, water_mass=0.002)
+    ends, half = np.array([throw.r_max, throw.r_min]), throw.r_max - throw.bottle.length / 2
+    distance = (shares * throw.bottle.length) ** 2 / (2 * half)
+    struck = shares * throw.bottle.length / (throw.omega0 * half)
+    phases = np.array([-0.3, 0.0, 0.3])
+    aloft = struck + RESTITUTION * struck * (1 + phases[:, None, None])
+    heights = RESTITUTION**2 * distance * (1 - phases[:, None, None] ** 2)
+    throw = replace(throw, duration=1.1 * float(aloft.max()))
+    start = (ends + np.array([-1.0, 1.0]) * distance).ravel()
+    (answer,) = yield [replace(ask_of(traits, throw, 2), times=np.unique(aloft), start=start)]
+    assert answer.r is not None
+    rows = np.searchsorted(answer.t, aloft)
+    answered = np.abs(answer.r[rows, np.arange(shares.size).reshape(shares.shape)] - ends)
+    right = (np.abs(answered - heights) < 0.05 * heights).all(axis=0)
+    stuck = (answered < 0.1 * heights).all(axis=0) & (heights[1] > 1000 * traits.epsilon * throw.bottle.length)
+    for rebound, end in np.argwhere(stuck[:-1] & right[1:])[::-1]:
+        share = RESTITUTION * shares[rebound, end]
+        speed = share * throw.omega0 * throw.bottle.length
+        return f"the {('base', 'cap')[end]} at {share:.2g} omega_0 L, {speed:.2g} m/s"
+    return ""
 
 
 def _rebounds(traits: Traits, spins: Sequence[float], answers: Sequence[Answer]) -> list[Rebound]:

@@ -839,6 +839,9 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("bulirsch_mean_of_movers", "piecewise", "in which v_CM takes the mean velocity of the flying slices"),
         ("adams_pece_last_impact_first", "piecewise", "whether the earliest of several comes first"),
         ("pyport_slice_at_the_cap", "published-vectors", "the program does not turn it back there"),
+        ("expint_rests_too_early", "restitution", "where a slice would leave the cap at 0.004 omega_0 L"),
+        ("series_rests_too_soon", "restitution", "where a slice would leave the cap at 0.008 omega_0 L"),
+        ("angle_rk4_sticks_early", "restitution", "where a slice would leave the base at 0.0015 omega_0 L"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
@@ -884,6 +887,13 @@ def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, 
     (result,) = certify(InProcess(solver, mistake), [check]).results
     assert result.verdict == FAILED
     assert advice in result.line
+
+
+@pytest.mark.parametrize("right", ["single", "expint", "series", "rootfinder"])
+def test_slow_impacts_of_right_solvers_rebound(right):
+    """The first counts in single precision, in which the lowest rebounds are lost to rounding."""
+    (result,) = certify(InProcess(LISTS["right"][right].solver(), right), ["restitution"]).results
+    assert result.verdict == PASSED
 
 
 def test_low_bounces_that_a_long_step_loses_are_no_mistake():
