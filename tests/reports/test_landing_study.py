@@ -369,6 +369,8 @@ def test_the_throws_of_a_share_are_dealt_out_to_every_cut():
     of_axes = {case.stream for key, case in cases.items() if key.axis in ("restitution", "friction", "scatter")}
     assert not of_axes & {case.stream for case in dealt.values()}
     (rival,) = {case.aim.rival for case in dealt.values()}
+    in_turn = key._replace(kind="in-turn")
+    assert {case.aim.rival for each, case in cases.items() if each._replace(cut=0) == in_turn} == {0.0}
     others = [
         share_of(some).interval[1] for (k, _), some in zip(aims.items(), rows, strict=True) if k.place == key.place
     ]
@@ -397,8 +399,12 @@ def test_every_finding_and_figure_says_what_is_assumed(found):
         assert exhibit.table
         assert "ssumed: e_table = 0.3" in exhibit.caption
     assert shares_csv(found).count("\n") == len(found.cells) + 1
-    ((family, fills, rows),) = page(found)["shares"]
+    (of_map,) = (exhibit.caption for exhibit in exhibits if exhibit.name == "landing-map")
+    assert of_map.endswith(f"{found.size.slices} slices.")
+    assert "scatter 5 %" not in of_map
+    ((family, fills, rows, aims),) = page(found)["shares"]
     assert family == "time of flight as thrown"
+    assert [name for name, _ in aims] == [f"ω₀ of the aim, {each} [rad/s]" for each in ("water", "ice")]
     assert [name for name, _ in rows] == ["water, together", "water, in turn", "ice"][: len(rows)]
     assert all(len(cells) == len(fills) for _, cells in rows)
 

@@ -177,8 +177,7 @@ def _model_uncertainty(results: LandingStudy) -> Finding:
 def _undecided(results: LandingStudy) -> Finding:
     """Return how many landings of the reference could not be certified; a regression of the paper's throw alone."""
     name, title = "landing-undecided", "Share of landings of the reference that no certificate decides"
-    shares = [cell.share for key, cell in results.cells.items() if key.kind in ("together", "in-turn", "ice")]
-    throws, unknown = sum(share.throws for share in shares), sum(share.undecided for share in shares)
+    unknown, throws = results.undecided
     if not throws:
         return observed(name, title, None, note="nothing was thrown")
     note = f"{unknown} of {throws}; every interval allows them to be upright or not"

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flipproof.chapters.landing.study import AXES, AXIS_KINDS, KINDS, OPTIMAL, Cell, Kind, LandingStudy
+from flipproof.chapters.landing.study import AXES, AXIS_KINDS, KINDS, OPTIMAL, WATER_AND_ICE, Cell, Kind, LandingStudy
 from flipproof.chapters.landing.throws import FAMILIES
 from flipproof.figures.style import new_figure, shared_legend, styled
 from flipproof.frame.columns import rows_csv
@@ -37,7 +37,8 @@ def figures(results: LandingStudy) -> list[Exhibit]:
     missed = f"With {FAMILIES['A']}, ice that does not reach the table from above counts as not upright. "
 
     def exhibit(name: str, title: str, caption: str, alt: str, maker: Callable[..., Figure], table: str) -> Exhibit:
-        caption = f"{caption} {results.assumed.capitalize()}."
+        assumed = f"{results.table_assumed}; {size.slices} slices" if name == "landing-map" else results.assumed
+        caption = f"{caption} {assumed.capitalize()}."
         return Exhibit(name=name, title=title, caption=caption, alt=alt, maker=maker, data=(results,), table=table)
 
     return [
@@ -45,7 +46,8 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             "landing-shares",
             "Does it stand? Water and ice over the filling",
             f"Share of the decided throws that end upright, {size.throws} throws a point. The 95 % interval (Wilson's) "
-            "counts undecided throws both ways, and its upper end allows for another aim being better. "
+            "counts undecided throws both ways; of the laws that chose the aims, water together and ice, its upper end "
+            "allows for another aim being better. "
             "The laws of the impact are models of one landing and are not averaged. The shaded fillings are those "
             f"that the paper calls optimal. {missed if 'A' in size.families else ''}".rstrip(),
             " ".join(share_line(results, family).replace("\n ", " ") + "." for family in size.families),
@@ -188,7 +190,8 @@ def map_csv(results: LandingStudy) -> str:
 
 def share_line(results: LandingStudy, family: str) -> str:
     """Return the shares of one family as lines."""
-    lines = [f"P(upright), {FAMILIES[family]}, with 95 % intervals of the best aim:"]
+    of_one_aim = KINDS["in-turn"].words
+    lines = [f"P(upright), {FAMILIES[family]}, with 95 % intervals of the best aim ({of_one_aim}: of the aim thrown):"]
     for kind, landing in KINDS.items():
         words = []
         for fill, cell in results.along("filling", kind, family):
@@ -202,14 +205,21 @@ def share_line(results: LandingStudy, family: str) -> str:
 
 
 def page(results: LandingStudy) -> dict[str, object]:
-    """Return what the chapter's template takes: a table a family, and why some throws were not made.
+    """Return what the chapter's template takes: a table a family, why some throws were not made, and the widest offset.
 
-    A table is the family in words, its fillings, and for every law of the impact its cell at each, None if not thrown.
+    A table is the family in words, its fillings, for every law of the impact its cell at each, None if not thrown, and
+    the cells of water and ice whose aims it shows.
     """
     shares = []
     for family in results.size.families:
         curves = {landing.words: dict(results.along("filling", kind, family)) for kind, landing in KINDS.items()}
         fills = sorted({fill for curve in curves.values() for fill in curve})
         rows = [(name, [curve.get(fill) for fill in fills]) for name, curve in curves.items() if curve]
-        shares.append((FAMILIES[family], fills, rows))
-    return {"shares": shares, "unaimed": sorted(set(results.unaimed.values()))}
+        aims = [
+            (f"ω₀ of the aim, {words} [rad/s]", [curve.get(fill) for fill in fills])
+            for words, kind in zip(("water", "ice"), WATER_AND_ICE, strict=True)
+            if (curve := curves[KINDS[kind].words])
+        ]
+        shares.append((FAMILIES[family], fills, rows, aims))
+    offset = math.degrees(max(results.size.offsets))
+    return {"shares": shares, "unaimed": sorted(set(results.unaimed.values())), "offset": offset}

@@ -42,8 +42,9 @@ KINDS: Final[Mapping[Kind, Landing]] = {
 
 WATER: Final[tuple[Kind, ...]] = ("together", "in-turn")
 WATER_AND_ICE: Final[tuple[Kind, ...]] = ("together", "ice")
+"""By these the aims are chosen: water is thrown about the same aims under both laws."""
 AXIS_KINDS: Final[tuple[Kind, ...]] = ("together", "in-turn", "ice")
-"""The laws of water; what is thrown beside one another everywhere, and along the axes of table and thrower."""
+"""What is thrown along the axes of table and thrower."""
 
 OPTIMAL: Final = (0.2, 0.5)
 """Fillings that the paper calls optimal (section 5)."""
@@ -139,7 +140,7 @@ class Cell:
         Of one aim, another aim plays no part.
         """
         share, another = self.share, other.share
-        if self.aim == other.aim:
+        if replace(self.aim, rival=0.0) == replace(other.aim, rival=0.0):
             share, another = replace(share, rival=0.0), replace(another, rival=0.0)
         return share.minus(another, correlation(self.stood, other.stood))
 
@@ -186,11 +187,22 @@ class LandingStudy:
         """What every share rests on, in words."""
         scatter = self.size.scatter
         return (
-            f"assumed: e_table = {self.size.restitution:g}, friction {self.size.friction:g}, scatter "
+            f"{self.table_assumed}, scatter "
             f"{100 * scatter.spin:g} % in omega_0, {math.degrees(scatter.angle):g} degrees in theta_0, "
             f"{scatter.speed:g} m/s in the upward launch velocity, none in the horizontal one; "
             f"{_cuts_words(self.size.cuts)} slices"
         )
+
+    @property
+    def table_assumed(self) -> str:
+        """What shares and map rest on, in words."""
+        return f"assumed: e_table = {self.size.restitution:g}, friction {self.size.friction:g}"
+
+    @property
+    def undecided(self) -> tuple[int, int]:
+        """How many of the counted throws no certificate decides, and how many were counted."""
+        shares = [cell.share for cell in self.cells.values()]
+        return sum(share.undecided for share in shares), sum(share.throws for share in shares)
 
 
 def filled(throw: Scenario, filling: float, slices: int, frozen: bool) -> Scenario:
@@ -242,7 +254,10 @@ def counting(throw: Scenario, size: Size, aims: Cases, rows: Rows) -> Cases:
             continue
         for kind, landing in KINDS.items():
             if landing.frozen == frozen:
-                cases |= _cut(size, Key("filling", filling, family, filling, kind), _case(size, aim, kind, size.throws))
+                # Of other aims under a law that chose none, nothing is known.
+                chosen = aim if kind in WATER_AND_ICE else replace(aim, rival=0.0)
+                case = _case(size, chosen, kind, size.throws)
+                cases |= _cut(size, Key("filling", filling, family, filling, kind), case)
     values = {"restitution": size.restitutions, "friction": size.frictions, "scatter": size.scatters}
     for kind, axis in product(AXIS_KINDS, values):
         place = last, size.axis_filling, KINDS[kind].frozen
