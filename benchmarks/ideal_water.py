@@ -3,7 +3,7 @@
     python benchmarks/ideal_water.py --cells 16                       # both kinds, five fillings
     python benchmarks/ideal_water.py --cells 16 --starts --fillings 0.25 0.5
     python benchmarks/ideal_water.py --verify                         # against what is known exactly, cells 8 to 24
-    python benchmarks/ideal_water.py --record                         # every flight of the report: a quarter of an hour
+    python benchmarks/ideal_water.py --record                         # every flight of the report: some 25 minutes
 
 One line for each flight, as columns that ``docs/water.md`` quotes. The last figures depend on the processor.
 """

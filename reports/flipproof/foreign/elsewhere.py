@@ -663,7 +663,7 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
             if not compare(traits, replace(ask, times=times), [answer], equation, unrefined).wrong:
                 impacts = "right where outputs lie close: look at what goes on within a long step; "
     advice = f"{impacts}{advice}".removesuffix("; ")
-    where = f"{len(wrong)} of {len(flights)} throws"
+    where = "a full bottle, thrown besides" if wrong[0][0] is FULL else f"{len(wrong)} of {len(flights)} throws"
     return Observation(holds=False, expected=expected, observed=observed, where=where, advice=advice, facts=facts)
 
 
