@@ -1,6 +1,9 @@
-"""Write the event problem set: problems.json, problems.npz, SHA256SUMS, and the table of docs/events.md.
+"""Write the event problem set anew, and print the table of docs/events.md.
 
-    python examples/events/make.py
+    python examples/events/make.py FOLDER        # the table needs heyoka
+
+The files beside this one are frozen: another processor may change last digits, and a change of any number is a new
+version. problems.json, problems.npz and SHA256SUMS go to FOLDER instead.
 
 The flights are ``ode_reference.solve(..., "eq8-wall")``: series between events, exact to rounding. Eight twins, whose
 release differs in the eleventh digit, say how well every number is known: its band is twice their largest change, and
@@ -11,6 +14,7 @@ solve every problem, and the table says by how much their impacts differ.
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
 import math
@@ -26,7 +30,6 @@ from slicemodel.scenario import Scenario
 
 VERSION = "1.0"
 HERE = Path(__file__).resolve().parent
-PAGE = HERE.parent.parent / "docs" / "events.md"
 LIMIT, SAFETY, TWINS, POINTS = 1e-6, 2.0, 8, 51
 FULL = {"fill": 1.0, "gravity": 0.0}
 ONE_TENTH = {"fill": 0.1, "duration": 0.6}
@@ -152,27 +155,27 @@ def row(task: dict[str, Any]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def main() -> None:
-    """Write the files and the table."""
+def main(folder: Path) -> None:
+    """Write the files into a folder, and print the table."""
+    folder.mkdir(parents=True, exist_ok=True)
     problems = [problem(name) for name in PROBLEMS]
     lines = ",\n".join(json.dumps(task) for task in problems)
     text = f'{{"title": "flipproof event problem set", "version": "{VERSION}", "problems": [\n{lines}\n]}}\n'
-    (HERE / "problems.json").write_text(text, encoding="utf-8")
+    (folder / "problems.json").write_text(text, encoding="utf-8")
     arrays = {}
     for task in problems:
         parts = {key: value for key, value in task.items() if key not in ("name", "what", "impacts")}
         parts |= {f"impact_{key}": value for key, value in task["impacts"].items()}
         arrays |= {f"{task['name']}/{key}": np.array(value) for key, value in parts.items()}
-    np.savez_compressed(HERE / "problems.npz", **arrays)
-    files = [HERE / "problems.json", HERE / "problems.npz"]
+    np.savez_compressed(folder / "problems.npz", **arrays)
+    files = [folder / "problems.json", folder / "problems.npz"]
     sums = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files]
-    (HERE / "SHA256SUMS").write_text("".join(sums), encoding="utf-8")
-    before, rest = PAGE.read_text(encoding="utf-8").split("<!-- table -->\n")
-    _, after = rest.split("<!-- end -->")
+    (folder / "SHA256SUMS").write_text("".join(sums), encoding="utf-8")
     head = ["| | what happens | beads | until [s] | impacts | solve_ivp [s] | heyoka [s] |", "|---" * 7 + "|"]
-    table = "\n".join([*head, *map(row, problems)])
-    PAGE.write_text(f"{before}<!-- table -->\n{table}\n<!-- end -->{after}", encoding="utf-8")
+    print("\n".join([*head, *map(row, problems)]))
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    main(parser.parse_args().folder)

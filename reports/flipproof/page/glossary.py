@@ -28,7 +28,11 @@ TERMS: Final[Mapping[str, str]] = {
     "restitution": "Speed of a slice after it strikes an end, divided by its speed before; e = 0 sticks, e = 1 "
     "bounces without loss.",
     "slice": "One of N equal parts of the water, treated as a point that slides along the axis; slices pass "
-    "through one another.",
+    "through one another, but not in rods and landings.",
+    "rods": "Very thin slices that keep their order and do not overlap, and stay at the end where they arrive.",
+    "column": "Water that keeps together and stretches evenly from the base until it meets the cap.",
+    "late spin": "Mean of ω over the second half of the flight, also called plateau.",
+    "twins": "Flights of one throw whose release differs in a late digit.",
     "time step": "A short piece of the flight over which a program holds ω and the centre of mass constant.",
     "Eq. 8": "The paper's equation for one slice: thrown outward from the centre of mass, slowed by drag, "
     "pulled by its weight.",
@@ -61,12 +65,12 @@ TERMS: Final[Mapping[str, str]] = {
     "band": "An estimate, not a bound, of how far a number could move by numerical causes alone: from eight flights "
     "whose release differs in the eleventh digit, or from finer settings.",
     "recoil": "The kick that the bottle gets when a slice strikes one of its ends.",
-    "certified": "The last halving of the step, twice the iterations and a slightly heavier or lighter bottle move ω "
-    "by no more than the tolerance, and a single slice rebounds as asked.",
+    "certified": "Of an engine: the last halving of the step, twice the iterations and a slightly heavier or lighter "
+    "bottle move ω by no more than the tolerance, and a single slice rebounds as asked.",
     "regression claim": "A statement that must hold in every report; if one fails, the report's exit status is 1.",
     "observation": "A number that is reported without a threshold; it cannot fail.",
     "ice": "Frozen water: no slice may move, so ω must stay constant.",
-    "impact": "A slice strikes an end of the bottle.",
+    "impact": "A slice strikes an end of the bottle; of a landing, the bottle strikes the table.",
 }  # fmt: skip
 
 EQUATIONS: Final[Mapping[str, str]] = {"Eq. 8": "eq8", "free flight": "free-flight"} | {

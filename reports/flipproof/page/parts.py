@@ -40,7 +40,7 @@ BEHIND: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "findings": ("All findings", "Every claim and every observation of this report, to search and to link to."),
     "solvers": ("Every solver", "What each solver solves, how it ended on this throw, and why what failed did."),
-    "glossary": ("Glossary", "Every name and symbol of this report in one plain sentence."),
+    "glossary": ("Glossary", "Names and symbols of this report, each in one plain sentence."),
     "provenance": (
         "Settings and provenance",
         "What was thrown, with which versions, on which machine; files for machines.",

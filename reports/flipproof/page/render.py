@@ -29,12 +29,11 @@ def unbroken(text: str) -> str:
 def amount(difference: Difference) -> str:
     """Return the size of a difference, its numerical band, and where known how far it moves with more slices.
 
-    As in "13 % ± 0.03 %; 0.35 % of ω₀ less at N = 100".
+    As in "13 % ± 0.032 %; 0.35 % of ω₀ less at N = 100".
     """
     size = percent(difference.largest)
     if difference.band is not None:
-        band = 100 * difference.band
-        size += f" ± {band:.1g} %" if band >= 1e-3 else " ± < 0.001 %"
+        size += f" ± {percent(difference.band)}" if difference.band >= 1e-5 else " ± < 0.001 %"
     if difference.finer is not None:
         slices, largest = difference.finer
         size += f"; {moved(difference.largest, largest, slices)}"

@@ -2,7 +2,7 @@
 
 The numbers, called headlines, are fractions of omega_0 and of two kinds:
 
-    largest   max |omega_b - omega_a| / omega_0 of one pair of solvers during the flight
+    largest   max |omega_b - omega_a| / omega_0 of one pair of solvers, t an output time
     share     fair share of one assumption in the mean of omega over the second half: the mean over all orders
 
 The story prints a number with the place in ``summary.json`` that it comes from:

@@ -109,6 +109,13 @@ def test_the_reference_thrown_otherwise_is_named(change, words):
     assert named(Thrown(change)) == words
 
 
+@pytest.mark.parametrize(
+    "words", ["a slice at rest is never let go", "a slice at rest is let go by a push without its weight"]
+)
+def test_two_mistakes_alike_on_these_throws_are_told_apart_on_others(words):
+    assert named(Likened(dict(MISTAKES["eq8"][1])[words])) == words
+
+
 def test_eq8_itself_and_what_no_mistake_explains_have_no_name():
     assert named(Thrown(lambda _: {})) == ""
     assert named(Thrown(lambda s: {"drag": 0.5 * s.drag, "gravity": 0.7 * s.gravity})) == ""

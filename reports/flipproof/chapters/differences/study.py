@@ -22,7 +22,9 @@ def percent(share: float) -> str:
 
 def moved(value: float, finer: float, slices: int) -> str:
     """Return how far a fraction moves with the number of slices, as in "0.35 % of ω₀ less at N = 100"."""
-    return f"{percent(abs(finer - value))} of ω₀ {'more' if finer >= value else 'less'} at N = {slices}"
+    change = finer - value
+    words = "the same" if abs(change) < 1e-9 else f"{percent(abs(change))} of ω₀ {'more' if change > 0 else 'less'}"
+    return f"{words} at N = {slices}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

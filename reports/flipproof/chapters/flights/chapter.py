@@ -124,8 +124,8 @@ def figures(results: Flown) -> Iterator[Exhibit]:
         flights,
         "centre-of-mass",
         "Centre of mass",
-        caption="Distance of the centre of mass from the cap. The smaller it is on landing, the more easily the bottle "
-        "topples; in a bottle of ice it is constant.",
+        caption="Distance of the centre of mass from the cap. The smaller it is at a landing, the more easily the "
+        "bottle topples; in a bottle of ice it is constant.",
         alt="Line plot of the centre of mass from the cap, as a fraction of the length, "
         f"{flights[0].r_cm[0] / length:.3f} at release. At the end: {{}}.",
         column="r_CM/L {} [1]",

@@ -98,8 +98,10 @@ def _water_and_ice(results: LandingStudy) -> Iterator[Finding]:
             verdict = "by both laws water stands more often"
         elif max(high for *_, high in by_law.values()) < 0:
             verdict = "by both laws ice stands more often"
+        elif straddling := [law for law, (_, low, high) in by_law.items() if low <= 0 <= high]:
+            verdict = f"undecided by {' and by '.join(straddling)}"
         else:
-            verdict = "undecided by one law, or not alike by both"
+            verdict = "the laws contradict one another"
         laws = "; ".join(f"{law}, {d:+.3f} ({low:+.3f} to {high:+.3f})" for law, (d, low, high) in by_law.items())
         title = f"P(upright), water minus ice, at filling {filling:g} (abstract, section 3: redistribution helps)"
         note = f"{verdict}; with 95 % intervals: {laws}; the number is of the first; {results.assumed}"
@@ -169,7 +171,7 @@ def _model_uncertainty(results: LandingStudy) -> Finding:
     (widest, low, high), where = max(pairs)
     note = (
         f"{where}; 95 % interval of this pair alone {low:+.3f} to {high:+.3f}; the laws are models of one impact and "
-        f"are not averaged; {results.assumed}"
+        f"are not averaged; both are thrown about the aims that {KINDS['together'].words}, chose; {results.assumed}"
     )
     return observed(name, title, widest, note=note, band=Band((high - low) / 2, "sample"))
 

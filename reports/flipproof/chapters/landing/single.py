@@ -96,13 +96,16 @@ def describe(rows: Sequence[Row], table: Table) -> str:
 
 def _touch_line(name: str, touch: Touch) -> str:
     read = touch_readings(touch)
+    tilt = math.degrees(touch.tilt)
+    side = "below" if read["static_margin"] > 0.0 else "above"
+    place = f"{side} its toppling angle by {math.degrees(abs(read['static_margin'])):.1f}"
+    if abs(tilt) > 90.0:
+        place = f"{180.0 - abs(tilt):.1f} from standing on its cap"
     falls = "rises" if read["touch_speed"] < 0.0 else "falls"
-    stands = "below" if read["static_margin"] > 0.0 else "above"
     return (
-        f"{name} touches at t = {touch.time:.4f} s: tilt {math.degrees(touch.tilt):+.1f} degrees, {stands} its "
-        f"toppling angle by {math.degrees(abs(read['static_margin'])):.1f}; omega {touch.omega:.2f} rad/s; {falls} at "
-        f"{abs(read['touch_speed']):.2f} m/s; energy {read['touch_energy']:.2f} E_s "
-        f"(saddle {saddle(touch.scenario):.4g} J)"
+        f"{name} touches at t = {touch.time:.4f} s: tilt {tilt:+.1f} degrees, {place}; "
+        f"omega {touch.omega:.2f} rad/s; {falls} at {abs(read['touch_speed']):.2f} m/s; "
+        f"energy {read['touch_energy']:.2f} E_s (saddle {saddle(touch.scenario):.4g} J)"
     )
 
 
@@ -120,5 +123,6 @@ def _how(outcome: Outcome, *, flat: bool) -> str:
     below = f"{outcome.margin:.1%}" if outcome.margin >= 5e-4 else "less than 0.1%"
     return (
         f"{outcome.outcome}; certain {outcome.certified:.3f} s after the touch, {below} below the saddle; "
-        f"bounces {outcome.bounces}; its base is {1000 * outcome.slid:+.0f} mm along the table by then"
+        f"bounces {outcome.bounces}; by then the middle of its base has moved {1000 * outcome.slid:+.0f} mm along the "
+        "table"
     )

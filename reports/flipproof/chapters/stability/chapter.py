@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
+from flipproof.chapters.differences.study import percent
 from flipproof.chapters.maps.study import vary
 from flipproof.curves.ensemble import largest_change
 from flipproof.figures.style import new_panels, styled
@@ -316,7 +317,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         axes.add_patch(Rectangle(corner, width, 0.94, fill=False, linestyle="--", linewidth=1.2))
     # Rows are numbers of iterations, not a scale: the rule lies below the first row that follows it.
     axes.axhline(sum(n < panel.enough for n in iterations) - 0.5, color="black", linewidth=2.5)
-    band = "" if math.isnan(panel.band) else f", reference ± {100 * panel.band:.1g} %"
+    band = "" if math.isnan(panel.band) else f", reference ± {percent(panel.band)}"
     words = f"M_w / M_b = {panel.mass_ratio:g}, N = {panel.slices}\nrule: {panel.enough} iterations{band}"
     axes.set_title(words, fontsize=9.5, loc="left")
 

@@ -60,10 +60,10 @@ class Observable(NamedTuple):
 
 OBSERVABLES: Final = (
     Observable("plateau", "plateau", "mean of ω/ω₀ over the second half", "1"),
-    Observable("omega", "ω(T)/ω₀", "ω on landing / ω₀", "1"),
-    Observable("theta", "θ(T)", "θ on landing", "rad"),
-    Observable("toppling", "θ_c(T)", "toppling angle on landing", "rad"),
-    Observable("v_cm", "v_CM(T)", "velocity of C_M in the bottle on landing", "m/s"),
+    Observable("omega", "ω(T)/ω₀", "ω at the end of the flight / ω₀", "1"),
+    Observable("theta", "θ(T)", "θ at the end of the flight", "rad"),
+    Observable("toppling", "θ_c(T)", "toppling angle at the end of the flight", "rad"),
+    Observable("v_cm", "v_CM(T)", "velocity of C_M in the bottle at the end of the flight", "m/s"),
 )
 
 

@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
-from flipproof.foreign.elsewhere import WHOLE
+from flipproof.foreign.elsewhere import HELD, SEED, STICKY, WHOLE, drawn
 from flipproof.foreign.likeness.flight import CAP, CENTRE, MEAN, MIDDLE, RECOIL, Mistake, factors_of, fly
 from flipproof.foreign.place import name_of, switches_of
 from ode_reference.models import MODELS
@@ -63,10 +63,16 @@ How much nearer than its equation a mistake must be to be named as near where it
 MAX_NAMED: Final = 2
 """Mistakes named at most; one that does not lead to the answers on all throws is not named beside more than these."""
 
+MAX_SEPARATING: Final = 3
+"""Throws asked for besides where several mistakes are named."""
+
 Factors = Mapping[str, float]
 Change = Factors | Callable[[Scenario], Factors]
 """Factors and switches of a flight; a function gives them for a throw."""
 
+
+Named = tuple[str, Change]
+"""What is wrong, and what it changes."""
 
 Changes = Mapping[str, Change | tuple[Change, ...]]
 """What is wrong -> what it changes; the words follow "it answers like a solver in which"."""
@@ -330,8 +336,9 @@ class _Flown:
 
     def off(self, change: Change) -> FloatArray:
         """Return by how many rooms the flight with a mistake is off at each time; NaN from too many events on."""
-        factors = change(self.ask.scenario) if callable(change) else change
-        omega = fly(self.ask, Mistake(**{**self.equation, **factors})) / abs(self.ask.scenario.omega0)
+        omega = fly(self.ask, Mistake(**{**self.equation, **_at(change, self.ask.scenario)})) / abs(
+            self.ask.scenario.omega0
+        )
         return np.abs(omega[: len(self.omega)] - self.omega) / self.room
 
     def excess(self, change: Change) -> float:
@@ -365,19 +372,23 @@ def naming(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], tuple[s
     if len(flown) < 2 or not max(without) > FAR:
         return "", False
     distances = [(words, change, [one.excess(change) for one in flown]) for words, change in mistakes]
-    named = [words for words, _, each in distances if max(each) <= 1.0]
+    named: Sequence[Named] = [(words, change) for words, change, each in distances if max(each) <= 1.0]
     near = [] if named else [(words, change) for words, change, each in distances if _is_near(each, without)]
     # With a mistake it may matter whether a slice at rest is let go by its push at rest, or has to be pushed when free.
-    named = named or [words for words, change in near if _explains(flown, partial(_at_once, change))]
-    named = named or [text for words, how in SLOW.items() if (text := _slow(flown, words, *how))]
+    at_once: list[Named] = [(words, partial(_at_once, change)) for words, change in near]
+    named = named or [one for one in at_once if _explains(flown, one[1])]
+    named = named or [one for words, how in SLOW.items() if (one := _slow(flown, words, *how))]
     acts = Mistake(**equation)._asdict()
     named = named or [
-        text
+        one
         for words, how in FITTED.items()
-        if all(acts[field] for field in how(1.0, flown[0].ask.scenario)) and (text := _fitted(flown, words, how))
+        if all(acts[field] for field in how(1.0, flown[0].ask.scenario)) and (one := _fitted(flown, words, how))
     ]
-    if named or near:
-        return _words(f"it answers {'' if named else 'nearly '}like", named or [words for words, _ in near]), True
+    if named:
+        named = yield from _separated(traits, equation, named)
+        return _words("it answers like", [words for words, _ in named]), True
+    if near:
+        return _words("it answers nearly like", [words for words, _ in near]), True
     counts = [
         (words, sum(d <= 1.0 and eq > SURELY for d, eq in zip(each, without, strict=True)))
         for words, _, each in distances
@@ -388,12 +399,45 @@ def naming(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], tuple[s
     return _words(f"on {most} of {len(flown)} throws it answers like", list(partly)) if told else "", False
 
 
+def _separated(
+    traits: Traits, equation: Factors, named: Sequence[Named]
+) -> Generator[Sequence[Ask], Sequence[Answer], Sequence[Named]]:
+    """Return those of some mistakes that also give the answers to the throws on which their flights differ most.
+
+    All of them, if none does.
+    """
+    throws = [HELD, STICKY, *(knobs for knobs in drawn(SEED) if not knobs.frozen)]
+    for _ in range(MAX_SEPARATING):
+        apart = [_apart(knobs.ask(0), equation, named) for knobs in throws]
+        widest = int(np.argmax(apart))
+        if not apart[widest] > CLEAR:
+            break
+        ask = throws.pop(widest).ask(0)
+        levels = LEVELS[::-1] if traits.refined_by else (0,)
+        try:
+            answers = yield [replace(ask, effort=effort_of(traits, ask.scenario, level)) for level in levels]
+        except ForeignError:
+            break
+        named = [one for one in named if _explains([_flown(traits, ask, answers, equation)], one[1])] or named
+    return named
+
+
+def _apart(ask: Ask, equation: Factors, named: Sequence[Named]) -> float:
+    """Return the largest distance of omega by two mistakes, fraction of omega_0."""
+    flights = [fly(ask, Mistake(**{**equation, **_at(change, ask.scenario)})) for _, change in named]
+    return float(np.nanmax(np.ptp(flights, axis=0), initial=0.0)) / abs(ask.scenario.omega0)
+
+
+def _at(change: Change, throw: Scenario) -> Factors:
+    return change(throw) if callable(change) else change
+
+
 def _words(how: str, named: Sequence[str]) -> str:
     return f"{how} a solver in which {' or '.join(list(dict.fromkeys(named))[:MAX_NAMED])}"
 
 
 def _at_once(change: Change, throw: Scenario) -> Factors:
-    return {**(change(throw) if callable(change) else change), "let_go_at_once": 1.0}
+    return {**_at(change, throw), "let_go_at_once": 1.0}
 
 
 def _flown(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: Factors) -> _Flown:
@@ -420,8 +464,8 @@ def _is_near(distances: Sequence[float], without: Sequence[float]) -> bool:
     return right and all(distance <= max(1.0, equation / NEARER) for distance, equation in pairs)
 
 
-def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> str:
-    """Return below which limit a mistake leads to the answers on all throws; empty with none."""
+def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> Named | None:
+    """Return below which limit a mistake leads to the answers on all throws, and its change; None with none."""
 
     def relative(limit: float) -> Change:
         return {field: limit}
@@ -433,20 +477,21 @@ def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> str:
     for unit, change_at in zip(units, ways, strict=True):
         # Limits between the same two speeds lead to the same flights.
         if limits := [limit for limit in LIMITS.tolist() if _explains(flown, change_at(limit))]:
-            return words.format(f"{limits[len(limits) // 2]:.1g} {unit}")
-    return ""
+            limit = limits[len(limits) // 2]
+            return words.format(f"{limit:.1g} {unit}"), change_at(limit)
+    return None
 
 
-def _fitted(flown: Sequence[_Flown], words: str, how: Callable[[float, Scenario], Factors]) -> str:
-    """Return with what factor a mistake leads to the answers on all throws; empty with none.
+def _fitted(flown: Sequence[_Flown], words: str, how: Callable[[float, Scenario], Factors]) -> Named | None:
+    """Return with what factor a mistake leads to the answers on all throws, and its change; None with none.
 
     It is searched on the first throw, which has few impacts, and narrowed down on all of them if one explains that.
     """
     factor = _nearest(flown[:1], how, GRID)
     if not _explains(flown[:1], partial(how, factor)) or not _helps(flown, partial(how, factor)):
-        return ""
+        return None
     factor = _nearest(flown, how, factor * (1.0 + SPAN * np.linspace(-1.0, 1.0, 15)))
-    return words.format(factor) if _explains(flown, partial(how, factor)) else ""
+    return (words.format(factor), partial(how, factor)) if _explains(flown, partial(how, factor)) else None
 
 
 def _nearest(flown: Sequence[_Flown], how: Callable[[float, Scenario], Factors], grid: FloatArray) -> float:
