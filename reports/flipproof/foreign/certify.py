@@ -272,7 +272,7 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
         return result(verdict=FAILED, observation=observation, reason=f"declared as a failure ({reason}), but holds")
     if observation.holds:
         return result(verdict=WEAK if observation.weak else PASSED, observation=observation)
-    if name in OF_MOTION:
+    if name in OF_MOTION or observation.moved:
         named, explained = _named(traits, recorder)
         # What explains some throws alone stands beside the advice, what explains all in its place.
         beside = [] if explained else [observation.advice]

@@ -513,7 +513,10 @@ DEFINED: Final = {
 
 def _rebound_advice(hits: Impacts) -> str:
     """Return what is wrong with the speeds of impacts: all by one factor, the rebound; else how they are answered."""
-    answered = "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered"
+    answered = (
+        "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered, and at "
+        "what an impact does"
+    )
     e = THROW.restitution
     powers = {", the root of e": e**0.5, ", e squared": e**2, ", an elastic impact": 1.0}
     moves = (hits.speed_after > 0.0) & (hits.speed_before > 0.0)
@@ -551,6 +554,7 @@ def check_definitions(traits: Traits) -> CheckGenerator:
                 observed=f"off by {error.max():.2g} of the largest speed",
                 where=time_of_max(hits.time, error),
                 advice=_rebound_advice(hits),
+                moved=True,
             )
     if answer.r is None or not given:
         raise NotApplicableError("no r is given" if answer.r is None else "neither r_cm nor inertia is given")

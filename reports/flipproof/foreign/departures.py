@@ -96,8 +96,8 @@ CATEGORIES: Final[Mapping[str, Category]] = {
     ),
     "where there is weight": (lambda i: i.throw.gravity > 0, "weight"),
     "where there is drag": (lambda i: i.throw.drag > 0, "drag"),
-    "where g = 0": (lambda i: i.throw.gravity == 0, "weight"),
-    "where there is no drag": (lambda i: i.throw.drag == 0, "drag"),
+    "where g = 0": (lambda i: i.throw.gravity == 0, "no weight"),
+    "where there is no drag": (lambda i: i.throw.drag == 0, "no drag"),
     "of an odd number of slices": (lambda i: i.throw.n_slices % 2 == 1, "odd"),
     "in which slices rest while there is drag": (lambda i: i.throw.drag > 0 and any(map(i.rests, ENDS)), "rests"),
     **_end_categories(BASE),
@@ -114,10 +114,15 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "order of impacts in a step": "several impacts close together: each at its own time, the earliest first",
     "weight": "the weight",
     "drag": "the drag, and against what v is measured",
+    "no drag": "what is done without drag: is a drag of 0 taken for none given?",
+    "no weight": "what is done without weight: is a gravity of 0 taken for none given?",
     "odd": "the loop over slices: every slice moves, also the last of an odd number",
     "impacts on rests": "the part of slices at rest in the impact of another",
 }
 """What to look at, by what happens between two outputs."""
+
+OF_FORCES: Final = ("weight", "drag", "no weight", "no drag")
+"""Keys that say little where a term is named, or where it happens without them, too."""
 
 LOW: Final = 0.03
 """Speed of an impact that may be overlooked in a long step [L omega_0]."""
@@ -128,6 +133,9 @@ FEW: Final = 3
 SURE: Final = 0.9
 """Fraction of the departures that a category must hold if none holds them all."""
 
+
+UNTOLD: Final = 0.15
+"""By how much a category that says nothing of the cause must fit better than one that does."""
 
 DepartureGenerator = Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]
 
@@ -341,7 +349,7 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
         for name, (holds, key) in _categories_of(intervals).items():
             inside = np.array([holds(interval) for interval in intervals])
             common = int(np.sum(inside & departs))
-            score = 2 * common / (int(inside.sum()) + total)
+            score = 2 * common / (int(inside.sum()) + total) - (0.0 if key else UNTOLD)
             if common >= min_share * total and score > best + 0.02:
                 best, category, look_at, members = score, name, key, inside
         if category:
@@ -354,9 +362,9 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
     cause = cause_of(departed, recoil=switches_of(equation).recoil, seldom=seldom and look_at == "drag")
     if look_at == "impacts on rests" and "recoil" in cause:
         cause = ""  # other impacts recoil rightly
-    if "look at" in cause or (cause and look_at in ("weight", "drag", "odd")):  # the terms are named
+    if "look at" in cause or (cause and look_at in (*OF_FORCES, "odd")):  # the terms are named
         look_at = ""
-    if look_at in ("weight", "drag") and (
+    if look_at in OF_FORCES and (
         (outside and 5 * (total - common) * count > common * (len(intervals) - count))  # it happens without it, too
         or seldom
     ):

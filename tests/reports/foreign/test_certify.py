@@ -839,12 +839,14 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("bulirsch_mean_of_movers", "piecewise", "in which v_CM takes the mean velocity of the flying slices"),
         ("adams_pece_last_impact_first", "piecewise", "whether the earliest of several comes first"),
         ("pyport_slice_at_the_cap", "published-vectors", "the program does not turn it back there"),
+        ("events_reaction_on_total", "definitions", "the drag of the slices moves the mass of bottle and water"),
         ("expint_rests_too_early", "restitution", "where a slice would leave the cap at 0.004 omega_0 L"),
         ("series_rests_too_soon", "restitution", "where a slice would leave the cap at 0.008 omega_0 L"),
         ("angle_rk4_sticks_early", "restitution", "where a slice would leave the base at 0.0015 omega_0 L"),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
+                ("events_no_drag_as_usual", "piecewise", "is a drag of 0 taken for none given?"),
                 ("three_eighths_forgets_a_light_bottle", "equation", "in which M_b (R^2/2 + L^2/12) counts"),
                 ("axial_kick_at_tube_centre", "angular-momentum", "right without rests: look at rests"),
                 ("rootfinder_cap_release_without_push", "piecewise", "a slice at rest on the cap is never let go"),

@@ -72,7 +72,8 @@ def figures(results: LandingStudy) -> list[Exhibit]:
             "What the share depends on",
             f"Share of throws that end upright at filling {size.axis_filling:g}, along each assumption, with the "
             f"others as they are; {size.axis_throws} throws a point. All points of an axis share the same throws. The "
-            "95 % intervals (Wilson's, undecided throws counted both ways) are for one aim.",
+            "95 % intervals (Wilson's, undecided throws counted both ways) are for one aim; where no throw is decided, "
+            "the curve has no point.",
             "; ".join(
                 f"P(upright) of water along {axis}: "
                 + ", ".join(f"{value:g}: {cell.share.value:.2f}" for value, cell in results.along(axis, "together"))
