@@ -752,12 +752,17 @@ def check_velocity(traits: Traits) -> CheckGenerator:
             if sizes[-1] < 0.7 * sizes[0]
             else "r jumps between times asked: look at how r and v are answered between two steps; "
             if rms(np.diff(answers[0].r, n=2, axis=0)) > JUMP * rms(np.diff(answers[0].r, axis=0))
+            else "so small a difference that does not fall: look at the coefficients of answers between two steps; "
+            if traits.refined_by and sizes[0] < SLIGHT
             else ""
         )
         + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )
 
+
+SLIGHT: Final = 5e-3
+"""Difference of v from dr/dt, fraction of the largest v, that is less than one of unit, frame or instant."""
 
 JUMP: Final = 0.1
 """Ratio of the second to the first differences of r between close times above which r is not smooth."""

@@ -218,6 +218,11 @@ def check_order_before(traits: Traits) -> CheckGenerator:
             "how a step begins without them, the instant at which omega, r_CM or J are taken, or how a step is cut to "
             "a time asked, costs the order"
         )
+    if not holds and 0.0 < changes[worst][0] < SLIGHT:
+        advice = (
+            f"already at the longest steps {worst} changes by no more than {changes[worst][0]:.0e}: look for a "
+            f"constant of few digits, or for single precision; {advice or default_advice}"
+        )
     return Observation(
         holds=holds,
         expected=f"order {declared:g} or more, within {ORDER_ROOM}",
@@ -227,6 +232,9 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         facts={"order_before_impacts": orders[worst], "orders": orders},
     )
 
+
+SLIGHT: Final = 1e-5
+"""Change of a field, a fraction of its largest value, below which a wrong order is no gross mistake of the method."""
 
 FRACTIONS: Final = (
     (0.0, 0.5, 1.0),

@@ -335,8 +335,10 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
     if not np.isin(arrays["end"], (-1.0, 1.0)).all():
         raise AnswerError("impacts.end holds other numbers than 1 (base) and -1 (cap)")
     if count and not (arrays["slice"].min() >= 0 and arrays["slice"].max() < n_slices):
+        from_one = arrays["slice"].min() == 1 and arrays["slice"].max() == n_slices
         raise AnswerError(
-            f"impacts.slice leaves [0, {n_slices - 1}]: number slices from 0, and keep no impacts of another question"
+            f"impacts.slice leaves [0, {n_slices - 1}]: "
+            f"{'number slices from 0' if from_one else 'keep no impacts of another question, and number slices from 0'}"
         )
     broken = arrays["slice"] % 1.0 != 0.0
     if broken.any():

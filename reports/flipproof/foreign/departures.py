@@ -134,6 +134,12 @@ SURE: Final = 0.9
 """Fraction of the departures that a category must hold if none holds them all."""
 
 
+UNEXPLAINED: Final = (
+    "no term explains it: look at what is held constant within a step, at coefficients of the method, "
+    "at iterations that end early, and at tolerances of its own"
+)
+"""What to look at where nothing is found that explains a departure."""
+
 UNTOLD: Final = 0.15
 """By how much a category that says nothing of the cause must fit better than one that does."""
 
@@ -192,10 +198,7 @@ def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureG
     where, advice = _describe(equation, intervals, departs)
     if ignored and not advice:
         advice = f"another {traits.refined_by} changes nothing: look at how ask.effort is used"
-    return where, advice or (
-        "no term explains it: look at what is held constant within a step, at coefficients of the method, "
-        "at iterations that end early, and at tolerances of its own"
-    )
+    return where, advice or UNEXPLAINED
 
 
 def _intervals_at(

@@ -29,7 +29,7 @@ import numpy as np
 import ode_reference
 from flipproof.foreign.checking import THROW, CheckGenerator, NotApplicableError, Observation, effort_of, rest_speed_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
-from flipproof.foreign.departures import departing
+from flipproof.foreign.departures import UNEXPLAINED, departing
 from flipproof.foreign.place import name_of, placing, switches_of
 from ode_reference.solver import usual_rest_speed
 from ode_reference.switches import Switches
@@ -654,6 +654,7 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
             departure, cause = yield from departing(traits, equation, [wrong[0][0].ask(seed)])
             if departure:  # more exact than the impact after which the whole flight is first wrong
                 together = TOGETHER if wrong[0][0] is FULL else ""
+                cause = "" if cause == UNEXPLAINED and "right at " in observed else cause  # the value tells more
                 impacts = f"there it departs {departure}; {cause and f'{cause}; '}{together}"
     if traits.refined_by is None and not wrong[0][1].error:
         ask = wrong[0][0].ask(seed)
