@@ -511,12 +511,15 @@ DEFINED: Final = {
 """What is answered beside r, and what to look at."""
 
 
+ANSWERED: Final = (
+    "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered, and at "
+    "what an impact does"
+)
+"""What to look at where slices leave their ends at no factor of their speed."""
+
+
 def _rebound_advice(hits: Impacts) -> str:
     """Return what is wrong with the speeds of impacts: all by one factor, the rebound; else how they are answered."""
-    answered = (
-        "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered, and at "
-        "what an impact does"
-    )
     e = THROW.restitution
     powers = {", the root of e": e**0.5, ", e squared": e**2, ", an elastic impact": 1.0}
     moves = (hits.speed_after > 0.0) & (hits.speed_before > 0.0)
@@ -526,12 +529,12 @@ def _rebound_advice(hits: Impacts) -> str:
         if not len(factors):
             continue
         if np.ptp(factors) > 0.01 * factors.max():
-            return answered
+            return ANSWERED
         factor = float(np.median(factors))
         if abs(factor / e - 1.0) > 0.01:
             word = next((word for word, value in powers.items() if abs(factor / value - 1.0) < 0.01), "")
             wrong.append(f"slices leave the {name} at {factor:.3g} of their speed{word}")
-    return f"{' and '.join(wrong)}: look at the rebound, and at what is answered of it" if wrong else answered
+    return f"{' and '.join(wrong)}: look at the rebound, and at what is answered of it" if wrong else ANSWERED
 
 
 def check_definitions(traits: Traits) -> CheckGenerator:
@@ -548,13 +551,14 @@ def check_definitions(traits: Traits) -> CheckGenerator:
         error /= max(float(np.max((hits.speed_before, hits.speed_after))), 1e-300)
         holds = bool(error.max() <= 0.02)  # they may be read off two steps
         if not (holds and answer.r is not None and given):
+            advice = _rebound_advice(hits)
             return Observation(
                 holds=holds,
                 expected="speed_after = e speed_before of each of the impacts, or 0",
                 observed=f"off by {error.max():.2g} of the largest speed",
                 where=time_of_max(hits.time, error),
-                advice=_rebound_advice(hits),
-                moved=True,
+                advice=advice,
+                moved=advice == ANSWERED,
             )
     if answer.r is None or not given:
         raise NotApplicableError("no r is given" if answer.r is None else "neither r_cm nor inertia is given")
