@@ -280,9 +280,9 @@ def check_times(traits: Traits) -> CheckGenerator:
         expected=f"the same within {room.max():.1g}, its own error",
         observed=observed,
         where=f"{where}, {time_of_max(sparse_times, errors)}",
-        advice=f"{advice}the flight begins at t = 0, also if that is not asked; "
-        "go exactly to each of ask.times, uneven as they are: cut the last step short, and leave nothing out; where an "
-        "answer between two steps is made, it must not move the state from which the next one goes on",
+        advice=(advice or "the flight begins at t = 0, also if that is not asked; ")
+        + "go exactly to each of ask.times, uneven as they are: cut the last step short, and leave nothing out; where "
+        "an answer between two steps is made, it must not move the state from which the next one goes on",
         facts={"times": float(errors.max())},
     )
 
@@ -298,6 +298,8 @@ def _outputs_advice(traits: Traits, sparse: Answer, dense_omega: FloatArray) -> 
     if 10 * np.max(np.abs(early.omega[1:] - exact)) < np.max(np.abs(sparse.omega - exact)):
         return "right if t = 0 is asked, too: look at what is taken at the first time asked instead of at release; "
     sparse_error, dense_error = (float(np.max(np.abs(omega - exact))) for omega in (sparse.omega, dense_omega))
+    if dense_error > 4 * sparse_error:
+        return "right where outputs are few: look at what is done where two are closer than a step, or no multiple; "
     close = "right where outputs lie close" if sparse_error >= 4 * dense_error else ""
     answers = yield [replace(ask_of(traits, throw), times=sparse.t) for throw in CALM.values()]
     for (name, throw), answer in zip(CALM.items(), answers, strict=True):
