@@ -155,6 +155,13 @@ def test_an_agreement_without_the_engines_is_not_told_as_theirs(names, told):
     assert (found.engines.count, found.engines.names) == ("two", "pymunk and MuJoCo")
 
 
+@pytest.mark.parametrize(("band", "vague"), [(0.009, False), (0.2, True), (None, False)])
+def test_an_agreement_that_its_uncertainty_hides_is_said_to_be_vague(band, vague):
+    title = "free-flight, solve_ivp, pymunk, mujoco: all agree within their bands"
+    found = story({"findings": [{"id": "agreement", "title": title, "value": 1e-3, "band": band}]}, {})
+    assert found.engines.vague is vague
+
+
 def test_an_agreement_before_the_end_of_the_flight_says_up_to_when():
     title = "free-flight, solve_ivp, pymunk, mujoco: all agree within their bands"
     for until in ("", "193 ms"):

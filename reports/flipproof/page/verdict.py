@@ -370,7 +370,9 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
     title = summary.at("findings/agreement/title") or ""
     if not all(engine in title for engine in ENGINES):
         numbers["agreement"] = None
+    agreement, band = numbers["agreement"], numbers["agreement_band"]
     engines = SimpleNamespace(
+        vague=bool(agreement and band and not band.within and band.value > agreement.value),
         count=COUNTED.get(len(ENGINES), str(len(ENGINES))),
         names=" and ".join(SPOKEN.get(engine, engine) for engine in ENGINES),
         until=title.partition(UP_TO)[2],

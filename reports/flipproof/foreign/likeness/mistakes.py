@@ -336,9 +336,7 @@ class _Flown:
 
     def off(self, change: Change) -> FloatArray:
         """Return by how many rooms the flight with a mistake is off at each time; NaN from too many events on."""
-        omega = fly(self.ask, Mistake(**{**self.equation, **_at(change, self.ask.scenario)})) / abs(
-            self.ask.scenario.omega0
-        )
+        omega = _fly(self.ask, self.equation, change) / abs(self.ask.scenario.omega0)
         return np.abs(omega[: len(self.omega)] - self.omega) / self.room
 
     def excess(self, change: Change) -> float:
@@ -424,8 +422,13 @@ def _separated(
 
 def _apart(ask: Ask, equation: Factors, named: Sequence[Named]) -> float:
     """Return the largest distance of omega by two mistakes, fraction of omega_0."""
-    flights = [fly(ask, Mistake(**{**equation, **_at(change, ask.scenario)})) for _, change in named]
+    flights = [_fly(ask, equation, change) for _, change in named]
     return float(np.nanmax(np.ptp(flights, axis=0), initial=0.0)) / abs(ask.scenario.omega0)
+
+
+def _fly(ask: Ask, equation: Factors, change: Change) -> FloatArray:
+    """Return omega [rad/s] of an equation with a mistake at the times asked."""
+    return fly(ask, Mistake(**{**equation, **_at(change, ask.scenario)}))
 
 
 def _at(change: Change, throw: Scenario) -> Factors:
