@@ -362,10 +362,8 @@ def naming(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], tuple[s
     flown = []
     for knobs in THROWS:
         ask = knobs.ask(0)
-        levels = LEVELS[::-1] if traits.refined_by else (0,)
         with suppress(ForeignError):
-            answers = yield [replace(ask, effort=effort_of(traits, ask.scenario, level)) for level in levels]
-            flown.append(_flown(traits, ask, answers, equation))
+            flown.append((yield from _flown(traits, ask, equation)))
     without = [_largest(one.right) for one in flown]
     if len(flown) < 2 or not max(without) > FAR:
         return "", False
@@ -411,12 +409,11 @@ def _separated(
         if not apart[widest] > CLEAR:
             break
         ask = throws.pop(widest).ask(0)
-        levels = LEVELS[::-1] if traits.refined_by else (0,)
         try:
-            answers = yield [replace(ask, effort=effort_of(traits, ask.scenario, level)) for level in levels]
+            flown = yield from _flown(traits, ask, equation)
         except ForeignError:
             break
-        named = [one for one in named if _explains([_flown(traits, ask, answers, equation)], one[1])] or named
+        named = [one for one in named if _explains([flown], one[1])] or named
     return named
 
 
@@ -443,7 +440,10 @@ def _at_once(change: Change, throw: Scenario) -> Factors:
     return {**_at(change, throw), "let_go_at_once": 1.0}
 
 
-def _flown(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: Factors) -> _Flown:
+def _flown(traits: Traits, ask: Ask, equation: Factors) -> Generator[Sequence[Ask], Sequence[Answer], _Flown]:
+    """Ask for a throw, at two levels if the solver can be refined."""
+    levels = LEVELS[::-1] if traits.refined_by else (0,)
+    answers = yield [replace(ask, effort=effort_of(traits, ask.scenario, level)) for level in levels]
     spin, fine = abs(ask.scenario.omega0), answers[0].omega
     own = np.maximum.accumulate(np.abs(fine - answers[1].omega)) / spin if answers[1:] else UNREFINED
     room = np.broadcast_to(max(FLOOR, 64 * traits.epsilon) + 3.0 * own, fine.shape)
