@@ -161,7 +161,55 @@ MISTAKES = {
         "restitution",
         "hangs on the phase",
     ),
+    "e in a byte": (changed(restitution=lambda q: round(255 * q["restitution"]) / 255), "restitution", "got 0.502 "),
+    "e always .5": (changed(restitution=lambda _: 0.5), "restitution", "the same rebound whatever"),
+    "first row twice": (
+        answered(lambda t, *rows: (t, *(np.r_[x[:1], x[:-1]] for x in rows))),
+        "contract",
+        "comes twice",
+    ),
+    "v a step late": (answered(lambda t, y, v: (t, y, np.r_[v[:1], v[:-1]])), "contract", "1.5 steps apart"),
+    "unsigned v": (answered(lambda t, y, v: (t, y, np.abs(v))), "contract", "not the rate of y"),
+    "noise of a rebound": (
+        changed(restitution=lambda q: q["restitution"] * (1 + 1e-3 * np.random.default_rng().standard_normal())),
+        "contract",
+        "another answer",
+    ),
+    "times stretched": (
+        answered(lambda t, y, v: (np.linspace(0, t[-1], len(t) - 1), y[:-1], v[:-1])),
+        "free fall",
+        "y advances by 0.992 of what v and t say at a step of 0.004 s",
+    ),
+    "gravity where there is none": (changed(gravity=lambda q: q["gravity"] or 9.81), "free fall", "9.81 m/s^2 where 0"),
+    "drag": (lambda *asked: dragged(*asked), "free fall", "speeds decay by about 0.05 /s in flight"),
+    "rest of a step left out": (lambda *asked: confused(*asked), "time of hit", "0.93 steps early to 0.95 late"),
+    "stops in the air": (
+        answered(lambda t, y, v: (t, *(np.where(t < 12.17, x, last) for x, last in ((y, 0.9), (v, 0.0))))),
+        "energy",
+        "it stops 0.9 m above the floor, 12.2 s after",
+    ),
+    "hovers": (answered(lambda t, y, v: (t, np.where((y == 0) & (v == 0), 5e-4, y), v)), "rest", "0.5 mm above"),
+    "jitters": (
+        answered(lambda t, y, v: (t, y, np.where((y == 0) & (v == 0), 6e-3 * (-1.0) ** np.arange(len(t)), v))),
+        "rest",
+        "still moves, by up to 6 mm/s",
+    ),
+    "three decimals": (answered(lambda t, y, v: (t, np.round(y, 3), np.round(v, 3))), "precision", "have 3 decimals"),
 }
+
+
+def dragged(height, speed, _, gravity, dt, duration):
+    """A body that falls through air, without a floor: v' = -g - v / 20."""
+    t = dt * np.arange(round(duration / dt) + 1)
+    fall, decay = 20 * gravity, np.exp(-t / 20)
+    return t, height + 20 * (speed + fall) * (1 - decay) - fall * t, (speed + fall) * decay - fall
+
+
+def confused(height, speed, restitution, _, dt, duration):
+    """The part of a step before the hit is taken for that after it; without gravity."""
+    t, y, v = located(height, speed, restitution, 0.0, dt, duration)
+    part = height / -speed / dt % 1
+    return t, np.where(v > 0, y + (2 * part - 1) * dt * v, y), v
 
 
 def spring(stiffness=1e6, step=1e-5):
@@ -266,8 +314,25 @@ def test_bodies_in_line():
         t, x, v = in_line(masses, positions, velocities, restitution, dt, duration)
         return t, x, v + 1e-3 * (t[:, None] > 0.06) * (velocities[-1] < 0)
 
-    for line, name in ((without_masses, "pairs"), (together, "three in line"), (leaning, "one instant")):
-        assert LINE_MEASURES[name](Adapter("line", located, line), 1e-3).remark
+    def immovable(masses, *asked):
+        return in_line([1e9 if m == 1000 else m for m in masses], *asked)
+
+    def apart(masses, positions, velocities, *asked):
+        touching = len(masses) == 2 and positions[0] == positions[1]
+        return in_line(masses, positions, [0.0, 0.0] if touching else velocities, *asked)
+
+    def from_the_left(masses, positions, velocities, *asked):
+        return in_line(masses, positions, [u * (u > 0) for u in velocities], *asked)
+
+    for line, name, words in (
+        (without_masses, "pairs", "masses 1 : 1000, e = 1)"),
+        (immovable, "pairs", "off by 0.002 m/s"),
+        (apart, "pairs", "touching at t = 0"),
+        (from_the_left, "pairs", "hit from the right"),
+        (together, "three in line", "all move on"),
+        (leaning, "one instant", "differ by 0.002 m/s"),
+    ):
+        assert words in LINE_MEASURES[name](Adapter("line", located, line), 1e-3).remark
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "mujoco"])
