@@ -188,6 +188,23 @@ MISTAKES = {
         "energy",
         "it stops 0.9 m above the floor, 12.2 s after",
     ),
+    "a floor of 20 mm": (
+        answered(
+            lambda t, y, v: (t, np.where(t > t[np.argmax(v > 0)], -0.1, y) if v[-1] > 4 and t[1] > 3e-3 else y, v)
+        ),
+        "penetration",
+        "it goes 1e+02 mm below the floor; in a step of 0.004 s it flies 40 mm",
+    ),
+    "stops after 25 hits": (
+        answered(lambda t, y, v: (t, *(np.where((t > 5.05) & (y[0] == 0.05), 0.0, x) for x in (y, v)))),
+        "rest",
+        "with e = 1 it bounces until 5 s only",
+    ),
+    "hits as on the earth": (
+        answered(lambda t, y, v: (t, y + 0.1 * (t > 0.6) * (y[0] == 0.5), v)),
+        "order",
+        "at 3.7 m/s^2 an impact is 0.1 m off",
+    ),
     "hovers": (answered(lambda t, y, v: (t, np.where((y == 0) & (v == 0), 5e-4, y), v)), "rest", "0.5 mm above"),
     "jitters": (
         answered(lambda t, y, v: (t, y, np.where((y == 0) & (v == 0), 6e-3 * (-1.0) ** np.arange(len(t)), v))),
@@ -324,7 +341,12 @@ def test_bodies_in_line():
     def from_the_left(masses, positions, velocities, *asked):
         return in_line(masses, positions, [u * (u > 0) for u in velocities], *asked)
 
+    def once_a_step(masses, positions, *asked):
+        near = len(masses) == 3 and 1e-5 < positions[2] - positions[1] < 1e-2
+        return in_line(masses, positions, [0.0, 0.0, 0.0] if near else asked[0], *asked[1:])
+
     for line, name, words in (
+        (once_a_step, "three in line", "with 0.000, 0.000, 0.000 m/s"),
         (without_masses, "pairs", "masses 1 : 1000, e = 1)"),
         (immovable, "pairs", "off by 0.002 m/s"),
         (apart, "pairs", "touching at t = 0"),
