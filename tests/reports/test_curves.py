@@ -1,6 +1,7 @@
 """Curves of any system: horizon, jumps, differences, hostile files."""
 
 import json
+import math
 import sys
 import warnings
 
@@ -76,6 +77,155 @@ def test_a_jump_may_be_a_moment_early_and_a_missing_one_is_named():
     assert any("4.005 that only the first run has" in line for line in lost.lines)
 
 
+COARSE = np.linspace(0.0, 10.0, 101)
+
+
+def step_at(moment, t=COARSE):
+    return (t >= moment).astype(float)
+
+
+@pytest.mark.parametrize("moment", np.arange(2.07, 9.0, 0.7))
+def test_a_jump_one_row_late_is_matched_wherever_it_is(moment):
+    found = compare(of(step_at(moment), COARSE), of(step_at(moment + 0.05), COARSE))
+    assert found.passed, found.lines
+    assert len(found.events.pairs) == 1
+    assert not compare(of(step_at(moment), COARSE), of(step_at(moment + 0.2), COARSE)).passed
+
+
+@pytest.mark.parametrize(
+    ("wrong", "size"),
+    [
+        (lambda x: 0.1 + 0.8 * x, 0.1),  # all levels, between the true ones
+        (lambda x: np.where((T >= 3.0) & (T < 3.005), 0.4, x), 0.6),  # the first row after a jump
+        (lambda x: np.where((T >= 2.985) & (T < 2.995), 0.4, x), 0.4),  # the last before it
+    ],
+)
+def test_values_beside_a_jump_are_compared_with_those_of_their_side(wrong, size):
+    base = (T // 1.0) % 2
+    found = compare(of(base), of(wrong(base)))
+    assert not found.passed
+    assert found.columns[0].gap.size.max() == pytest.approx(size)
+
+
+def ball(t, late=0.0):
+    """Height and speed of a ball that falls from 1 m with e = 0.7, exactly."""
+    height, speed = np.ones(len(t)), np.zeros(len(t))
+    start, h, u = late, 1.0, 0.0
+    for _ in range(40):
+        s = t - start
+        flying = s >= 0
+        height[flying], speed[flying] = (h + u * s - 4.905 * s * s)[flying], (u - 9.81 * s)[flying]
+        start += (u + np.sqrt(u * u + 19.62 * h)) / 9.81
+        h, u = 0.0, 0.7 * np.sqrt(u * u + 19.62 * h)
+    height[t >= start], speed[t >= start] = 0.0, 0.0
+    return height, speed
+
+
+@pytest.mark.parametrize(("rows", "others"), [(281, 5601), (5601, 281), (1203, 1011), (457, 458)])
+def test_one_ball_on_two_grids_is_one_ball(rows, others):
+    grids = np.linspace(0.0, 2.8, rows), np.linspace(0.0, 2.8, others)
+    height, speed = (compare(*(of(ball(t)[k], t) for t in grids), tolerance=0.01) for k in (0, 1))
+    assert height.passed, height.lines
+    assert speed.passed, speed.lines
+    slow = compare(of(ball(grids[0])[1], grids[0]), of(0.9 * ball(grids[1])[1], grids[1]), tolerance=0.01)
+    assert not slow.passed
+
+
+def test_a_ball_released_less_than_a_step_later_differs_by_its_speed_alone():
+    t = np.linspace(0.0, 2.0, 320)  # later bounces are a few rows apart
+    for part in (0.1, 0.4, 0.8):
+        delay = part * t[1]
+        assert compare(of(ball(t)[1], t), of(ball(t, delay)[1], t), tolerance=1.5 * 9.81 * delay).passed
+        assert not compare(of(ball(t)[1], t), of(ball(t, delay)[1], t), tolerance=0.5 * 9.81 * delay).passed
+
+
+def test_a_finer_tolerance_never_lets_a_difference_pass():
+    t, times = np.linspace(0.0, 10.0, 298), np.linspace(0.0, 10.0, 96)
+    other = of(np.sin(5.7 * times) + 0.5 * np.sin(np.pi * times / 10), times)
+    assert not any(compare(of(np.sin(5.7 * t), t), other, tolerance=size).passed for size in (0.1, 0.01, 1e-3, 1e-6))
+    spike = np.sin(COARSE) + 0.3 * (np.arange(101) == 47)
+    assert not compare(of(np.sin(COARSE), COARSE), of(spike, COARSE.astype(np.float32).astype(float))).passed
+
+
+def test_what_interpolation_hides_is_not_said_to_agree():
+    t, times = np.linspace(0.0, 10.0, 997), np.linspace(0.0, 10.0, 53)
+    found = compare(of(np.sin(t), t), of(np.sin(times), times), tolerance=1e-5)
+    assert not found.passed
+    assert "interpolation leaves half of the tolerance at 5 of 997 times only" in found.lines[-1]
+    assert compare(of(np.sin(t), t), of(np.sin(times), times), tolerance=0.02).passed
+
+
+def test_many_jumps_are_all_matched():
+    t = np.arange(30001.0)
+    found = compare(of((t // 5) % 2, t), of((np.maximum(t - 1, 0) // 5) % 2, t))
+    assert len(found.events.pairs) == 5999
+    assert found.parted == 30000  # the last of A lies beyond the end of B
+
+
+def test_listed_events_are_the_jumps():
+    t = np.linspace(0.0, 2.0, 201)
+    runs = []
+    for moment in (0.998, 1.002):
+        events = np.array([moment])
+        runs.append(Curves("run", t, {"x": np.where(t < moment, 1.0, -1.0)}, events))
+    assert compare(*runs).passed
+    assert compare(*runs).events.shift == pytest.approx([0.004])
+
+
+def test_a_twin_says_nothing_of_jumps_before_its_own():
+    base, twin = step_at(10.05 / 10) + step_at(9.05), step_at(10.05 / 10) + step_at(9.65)
+    early = compare(of(base, COARSE), of(step_at(1.85) + step_at(9.05), COARSE), twins=[of(twin, COARSE)])
+    assert not early.passed
+    assert compare(of(base, COARSE), of(step_at(10.05 / 10) + step_at(9.85), COARSE), twins=[of(twin, COARSE)]).passed
+
+
+def test_events_of_all_columns_are_listed():
+    x, y = step_at(2.05) + step_at(4.05), step_at(7.95)
+    found = compare(of(x, COARSE, y=y), of(x, COARSE, y=0.0 * y))
+    assert len(found.events.pairs) == 2
+    assert found.events.lone.tolist() == [[pytest.approx(7.95), 0.0]]
+    assert any("they part at t = 8, after the event at t = 7.95 that only the first run has" in s for s in found.lines)
+
+
+def test_a_twin_on_other_times_shows_its_own_change_alone():
+    times = np.linspace(0.0, 10.0, 731)
+    base = of(np.sin(T))
+    assert compare(base, base, twins=[of(np.sin(times) + 1e-9, times)]).horizon is None
+    short = compare(base, base, twins=[of(np.sin(T[:500]), T[:500], label="short")])
+    assert any("short ends at t = 4.99: nothing later can be compared" in line for line in short.lines)
+    assert (
+        "base is equal to base: it shows nothing"
+        in compare(*2 * (of(np.sin(T), label="base"),), twins=[of(np.sin(T), label="base")]).lines
+    )
+
+
+def test_each_column_has_its_own_horizon_in_words():
+    base, twin = of(np.sin(T), y=np.cos(T)), of(np.sin(T) + 1e-6 * np.exp(T), y=np.cos(T) + 1e-8 * np.exp(T))
+    lines = compare(base, base, twins=[twin]).lines
+    assert any(line.startswith("x: from t = 5.53") for line in lines)
+    assert not any(line.startswith("y: from t =") for line in lines)
+    assert any("grows at 1 per unit of time" in line for line in lines)
+    linear = compare(base, base, twins=[of(np.sin(T) + 1e-6 * T, y=np.cos(T))]).lines
+    assert any("x: largest difference 0 at t = 0; the twins' change does not grow exponentially" in s for s in linear)
+
+
+def test_numbers_and_times_have_the_digits_that_tell_them_apart():
+    found = compare(of(0.0 * COARSE, COARSE + 1.7e9), of(np.full(101, 1.000001e-3), COARSE + 1.7e9))
+    assert "0.001000001 > 0.001" in found.lines[-1]
+    shifted = compare(of(step_at(5.05), COARSE + 1.7e9), of(step_at(7.05), COARSE + 1.7e9))
+    assert any("they part at t = 1700000005.1" in line for line in shifted.lines)
+
+
+@pytest.mark.parametrize("tolerance", [math.nan, -1.0, math.inf, {"y": 1.0}])
+def test_a_tolerance_that_is_none_is_refused(tolerance):
+    with pytest.raises(ValueError, match="tolerance"):
+        compare(of(T), of(T), tolerance=tolerance)
+
+
+def test_a_tolerance_beyond_all_change_is_remarked():
+    assert "x: the tolerance, 0.001, exceeds all of its change, 1e-08" in compare(of(1e-9 * T), of(1e-9 * T)).lines
+
+
 def test_rows_between_the_first_and_the_last_of_one_time_are_named():
     t = np.array([0.0, 0.0, 0.0, 1.0])
     one, other = (Curves(name, t, {"x": np.array([1.0, inner, 3.0, 4.0])}) for name, inner in (("a", 2.0), ("b", 20.0)))
@@ -141,6 +291,24 @@ def test_files_of_any_columns_are_compared(tmp_path, capsys, suffix):
     assert cli.main(["compare", str(a), str(b), "--tolerance", "0.01", "--columns", "x"]) == 0
     assert cli.main(["compare", str(a), str(b), "--columns", "nothing"]) == 2
     assert cli.main(["compare", str(a), str(b), "--from-twins"]) == 2
+    capsys.readouterr()
+    assert cli.main(["compare", str(a), str(tmp_path / f"missing{suffix}")]) == 2
+    assert capsys.readouterr().err.endswith(f"missing{suffix} is no file\n")
+
+
+def test_columns_that_are_not_compared_are_named(tmp_path, capsys):
+    a, b = (written(tmp_path / f"{n}.csv", {"t": T, "omega": 2 + 0 * T, "x": T + by}) for n, by in (("a", 0), ("b", 5)))
+    assert cli.main(["compare", str(a), str(b), "--tolerance", "1e-3"]) == 0
+    assert f"{b}: x is not compared; --columns compares any" in capsys.readouterr().out
+    assert cli.main(["compare", str(a), str(b), "--shift", "0"]) == 1
+
+
+@pytest.mark.parametrize(("text", "words"), [("t;x\n0,5;1\n", "semicolons"), ("t\tx\n0\t1\n", "tabs")])
+def test_other_separators_are_named(tmp_path, text, words):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=f"line 1 has {words}: separate columns by commas"):
+        read(path)
 
 
 @pytest.mark.parametrize(
@@ -155,6 +323,7 @@ def test_files_of_any_columns_are_compared(tmp_path, capsys, suffix):
         ({"t": [0], "x": [0]}, ("'t'", "1 rows")),
         ({"t": [0, 1]}, ("no column beside",)),
         ({"t": [0, 1], "x": [0, 1, 2]}, ("no column beside 't' (2,), but 'x' (3,)",)),
+        ({"t": [0, 1], "y": [[0, 1], [1, 2]]}, ("'y' (2, 2); save the rows of an array as columns",)),
         ({}, ("no column t", "it has none")),
     ],
 )

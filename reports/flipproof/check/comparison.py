@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flipproof.chapters.differences.study import PARTING_BAND
-from flipproof.curves.compare import on_common_times
+from flipproof.curves.gap import on_common_times
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.output.tables import QUANTITIES, Curve
 from slicemodel.observables import plateau

@@ -147,8 +147,8 @@ def add_compare(commands: Any) -> None:
     )
     compare.add_argument("--from-twins", action="store_true", help="allow only the differences that the twins show")
     compare.add_argument(
-        "--shift", type=tolerance, default=0.0, metavar="S", help="time by which a jump may be early or late (default: "
-        "one output step, and what the twins show)",
+        "--shift", type=tolerance, metavar="S", help="time by which a jump may be early or late, beyond one output "
+        "step and what the twins show",
     )  # fmt: skip
     compare.add_argument("--plot", type=output, metavar="FILE.png", help="draw files' differences (.png or .svg)")
     add_json(compare, "both curves' differences")
@@ -161,15 +161,22 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _compares_any_system(options: argparse.Namespace) -> bool:
     """Return whether two files are to be compared that need not be throws of a bottle."""
-    for_files = (
-        options.columns or options.twin or options.twin_of_b or options.from_twins or options.plot or options.shift
-    )
+    from flipproof.curves.files import SUFFIXES
+
+    for_files = options.columns or options.twin or options.twin_of_b or options.from_twins or options.plot
+    for_files = for_files or options.shift is not None
     paths = Path(options.first), Path(options.second)
     if not all(path.is_file() for path in paths):
         if for_files:
             missing = next(path for path in paths if not path.is_file())
             raise ValueError(f"{missing} is no file: --columns, --twin, --from-twins, --shift and --plot compare files")
+        for path in paths:
+            if path.suffix in SUFFIXES and not path.is_file():
+                raise ValueError(f"{path} is no file")
         return False
+    for path in paths:
+        if path.suffix not in SUFFIXES:
+            raise ValueError(f"{path}: the name must end in {', '.join(SUFFIXES)}")
     if for_files or any(path.suffix in (".parquet", ".npz", ".nc") for path in paths):
         return True
     from flipproof.output.tables import QUANTITIES, read_cells
@@ -192,7 +199,7 @@ def _compare_curves(options: argparse.Namespace) -> int:
     allowed = None if options.from_twins else TOLERANCE if options.tolerance is None else options.tolerance
     comparison = compare(
         first, second, twins=twins, twins_of_second=twins_of_b, columns=options.columns, tolerance=allowed,
-        shift=options.shift,
+        shift=options.shift or 0.0,
     )  # fmt: skip
     write_json(options.json, comparison.to_mapping())
     write_junit(options.junit, comparison.findings, "flipproof compare")

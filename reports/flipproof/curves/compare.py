@@ -9,8 +9,9 @@ and two runs can be compared at a tolerance while the band is at most half of it
 
     |B - A| > tolerance + band + error of interpolation
 
-so that a difference of twice the tolerance is seen, as long as both are known within their bands. A jump that both
-have, a moment apart, is no difference: around it, B may take any value that A takes within that moment (``tube``).
+so that a difference of twice the tolerance is seen, as long as both are known within their bands. The error of
+interpolation is an estimate: where it exceeds half the tolerance, twice of it is granted, and nothing is said to agree.
+A jump that both have, a moment apart, is no difference (``gap``).
 """
 
 from __future__ import annotations
@@ -18,15 +19,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.curves.events import Matched, jumps, match
+from flipproof.curves.events import Matched, listed, match
 from flipproof.curves.files import Curves
+from flipproof.curves.gap import Gap, gap
 from flipproof.curves.growth import Growth, first_crossing, fit_growth
-from flipproof.curves.tube import tube_around
 from flipproof.frame.findings import Band, Finding, finite_or_none, regression
 from slicemodel.trajectory import FloatArray
 
@@ -36,91 +38,19 @@ SAFETY: Final = 2.0
 TOLERANCE: Final = 1e-3
 """Difference that is admissible unless another is asked for, in the unit of the column."""
 
-
-def on_common_times(
-    t: FloatArray, values: FloatArray, times: FloatArray, other_values: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return common times, the first curve's values, the second's at these, and which are interpolated, (K,) each.
-
-    At an event a curve has one value before and one after it; like is compared with like.
-    """
-    starts, ends = np.diff(t, prepend=-np.inf) > 0, np.diff(t, append=np.inf) > 0
-    kept = (starts | ends) & (t >= times[0]) & (t <= times[-1])
-    t, values, after = t[kept], values[kept], ends[kept]
-    tolerance = 1e-12 * max(abs(times[0]), abs(times[-1]))  # printing and reading a time may change it by this
-    low, high = np.searchsorted(times, t - tolerance, "left"), np.searchsorted(times, t + tolerance, "right") - 1
-    coincident = low <= high
-    resampled = np.where(after, other_values[high], other_values[np.minimum(low, len(times) - 1)])
-    resampled[~coincident] = np.interp(t[~coincident], times, other_values)
-    return t, values, resampled, ~coincident
+MIN_COMPARED: Final = 0.5
+"""Least share of the times before the horizon at which interpolation must leave half of the tolerance."""
 
 
-def interpolation_error(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
-    """Estimate the error of linear interpolation as h^2 / 8 max |y''| of the two ends of the interval."""
-    h = np.diff(t)
-    slope = np.divide(np.diff(values), h, out=np.zeros_like(h), where=h > 0.0)
-    curvature = np.zeros(len(t))
-    curvature[1:-1] = 2.0 * np.abs(np.diff(slope)) / np.maximum(t[2:] - t[:-2], np.finfo(float).tiny)
-    if len(t) > 2:
-        curvature[0], curvature[-1] = curvature[1], curvature[-2]
-    error = h**2 / 8.0 * np.maximum(curvature[1:], curvature[:-1])
-    return np.asarray(error[np.clip(np.searchsorted(t, at, "right") - 1, 0, len(h) - 1)])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Gap:
-    """|second - first| of one column at the common times, (K,); ``error`` is that of interpolation.
-
-    Around jumps that both have within ``shift`` the gap is the distance from the tube of that width.
-    """
-
-    t: FloatArray
-    first: FloatArray
-    second: FloatArray
-    size: FloatArray
-    error: FloatArray
-    interpolated: int
-    matched: Matched
-
-
-def gap(first: Curves, second: Curves, column: str, *, shift: float, min_jump: float) -> Gap:
-    """Return how far two curves are apart in a column; a jump is larger than ``min_jump`` and may be ``shift`` early.
-
-    Raises ValueError if they share fewer than 2 times.
-    """
-    values, other_values = first.columns[column], second.columns[column]
-    t, left, right, interpolated = on_common_times(first.t, values, second.t, other_values)
-    if len(t) < 2:
-        raise ValueError(
-            f"{first.label} ({first.t[0]:g} to {first.t[-1]:g}) has {len(t)} times within those of {second.label} "
-            f"({second.t[0]:g} to {second.t[-1]:g}); at least 2 are needed"
-        )
-    size = np.abs(right - left)
-    of_first, of_second = jumps(first.t, values, min_jump), jumps(second.t, other_values, min_jump)
-    matched = match(
-        of_first.time[of_first.time <= t[-1]], of_second.time[of_second.time <= t[-1]], shift + of_first.step
-    )
-    reach = of_first.step + of_second.step
-    for t_first, t_second in matched.pairs:
-        around = (t >= min(t_first, t_second) - reach) & (t <= max(t_first, t_second) + reach)
-        lower, upper = tube_around(first.t, values, t[around], abs(t_second - t_first) + reach, 0.0)
-        size[around] = np.maximum(0.0, np.maximum(right[around] - upper, lower - right[around]))
-    error = np.where(interpolated, interpolation_error(second.t, other_values, t), 0.0)
-    return Gap(
-        t=t, first=left, second=right, size=size, error=error, interpolated=int(interpolated.sum()), matched=matched
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Column:
     """One column of a comparison.
 
     Parameters
     ----------
     band : (K,) - of the difference, from twins; zero without any
-    comparable : (K,) - where the band is at most half the tolerance
+    known : (K,) - where the band is at most half the tolerance
     tolerance : in the unit of the column; 0 where the twins alone decide
-    horizon : first time that is not comparable; None: all are
     growth : of the twins' change, up to where it exceeds the tolerance
     last_digit : when a change of the first row by one unit in the last place exceeds the tolerance; None: not known
     """
@@ -128,34 +58,67 @@ class Column:
     name: str
     gap: Gap
     band: FloatArray
-    comparable: NDArray[np.bool_]
+    known: NDArray[np.bool_]
     tolerance: float
-    horizon: float | None
     growth: Growth
     last_digit: float | None
 
-    @property
+    @cached_property
+    def comparable(self) -> NDArray[np.bool_]:
+        """Where band and interpolation each leave half of the tolerance, (K,)."""
+        return self.known & ((self.gap.error <= 0.5 * self.tolerance) | (self.tolerance == 0.0))
+
+    @cached_property
+    def horizon(self) -> float | None:
+        """First time at which the band is too wide; None: never."""
+        unknown = np.flatnonzero(~self.known)
+        return float(self.gap.t[unknown[0]]) if len(unknown) else None
+
+    @cached_property
     def allowed(self) -> FloatArray:
         """Admissible difference, (K,)."""
-        return self.tolerance + self.band + self.gap.error
+        return self.tolerance + self.band + self.gap.error * np.where(self.comparable, 1.0, 2.0)
+
+    @cached_property
+    def inadmissible(self) -> NDArray[np.bool_]:
+        """Where the difference is not admissible, (K,)."""
+        return self.known & (self.gap.size > self.allowed)
 
     @property
-    def worst(self) -> int | None:
-        """Row of the largest ratio of the difference to what is admissible; None: no row can be compared.
+    def reason(self) -> str:
+        """Why nothing is said to agree; empty if enough can be compared.
 
-        That two runs begin alike compares nothing, if no later row can be compared.
+        That two runs begin alike compares nothing, if no later time can be compared.
         """
+        if not self.known[1:].any():
+            return "no time after the first can be compared: the band is wider than half the tolerance"
+        count, known = int(self.comparable.sum()), int(self.known.sum())
+        if self.comparable[1:].any() and count >= MIN_COMPARED * known:
+            return ""
+        return (
+            f"interpolation leaves half of the tolerance at {count} of {known} times only: give both at the same times"
+        )
+
+    @cached_property
+    def worst(self) -> int | None:
+        """Row of the largest ratio of the difference to what is admissible; None: too little can be compared."""
+        judged = self.inadmissible if self.inadmissible.any() else self.comparable
+        if self.reason and not self.inadmissible.any():
+            return None
         with np.errstate(all="ignore"):
             ratio = np.nan_to_num(self.gap.size / self.allowed, posinf=np.inf)
-        ratio[~self.comparable] = -1.0
-        later = self.comparable[1:].any() or len(self.comparable) == 1
-        return int(ratio.argmax()) if self.comparable.any() and (later or self.parted is not None) else None
+        return int(np.where(judged, ratio, -1.0).argmax())
+
+    @property
+    def largest(self) -> int:
+        """Row of the largest difference where the two can be compared, or anywhere, if they cannot."""
+        judged = self.comparable | self.inadmissible
+        return int(np.where(judged, self.gap.size, -1.0).argmax() if judged.any() else self.gap.size.argmax())
 
     @property
     def parted(self) -> float | None:
         """First time at which the difference is not admissible; None: never."""
-        inadmissible = np.flatnonzero(self.comparable & (self.gap.size > self.allowed))
-        return float(self.gap.t[inadmissible[0]]) if len(inadmissible) else None
+        return float(self.gap.t[self.inadmissible.argmax()]) if self.inadmissible.any() else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,41 +154,54 @@ class Comparison:
             id_, k = f"compare-{_slug(column.name)}", column.worst
             title = f"difference in {column.name} between {self.first} and {self.second}"
             if k is None:
-                note = "no time after the first can be compared: the band is wider than half the tolerance"
-                findings.append(regression(id_, title, None, "", (0.0, column.tolerance), note))
+                findings.append(regression(id_, title, None, "", (0.0, column.tolerance), column.reason))
                 continue
             count = int(column.comparable.sum())
-            note = f"at t = {column.gap.t[k]:.6g}, {count} of {len(column.gap.t)} times compared"
+            note = f"at t = {column.gap.t[k]:.{self.digits}g}, {count} of {len(column.gap.t)} times compared"
             if count < len(column.gap.t):
                 note += ", those at which bands and interpolation leave half of the tolerance"
             value, allowed = float(column.gap.size[k]), float(column.allowed[k])
-            band = Band(float(column.band[k] + column.gap.error[k]), "twins")
+            band = Band(float(column.band[k]), "twins") if column.band[k] else None
             findings.append(regression(id_, title, value, "", (0.0, allowed), note, band=band))
         return tuple(findings)
 
     @property
+    def digits(self) -> int:
+        """Digits of times that tell one output step from the next, 6 to 15."""
+        t = self.columns[0].gap.t
+        step, largest = float(np.median(np.diff(t))), float(np.abs(t).max())
+        return int(np.clip(math.ceil(math.log10(largest / step)) + 2, 6, 15)) if step > 0.0 and largest > 0.0 else 6
+
+    @property
     def lines(self) -> list[str]:
         """The comparison in lines of text, the verdict last."""
-        lines = list(self.notes)
+        lines, digits = list(self.notes), self.digits
         for column in self.columns:
-            gap, k = column.gap, int(column.gap.size.argmax())
-            text = f"{column.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.6g}"
+            gap, k = column.gap, column.largest
+            text = f"{column.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.{digits}g}"
             if gap.interpolated:
                 text += f" ({gap.interpolated} of {len(gap.t)} times interpolated)"
             if column.band.any():
-                text += f"; the twins' change {column.growth.words.replace('/s', 'per unit of time')}"
+                text += f"; the twins' change {_growth_text(column.growth)}"
             lines.append(text)
             if column.last_digit is not None:
                 lines.append(
-                    f"{column.name}: a change by one unit in the last place shows {column.tolerance:g} at "
-                    f"t = {column.last_digit:.3g}"
+                    f"{column.name}: in exact arithmetic a change by one unit in the last place would show "
+                    f"{column.tolerance:g} at about t = {column.last_digit:.2g}; a solver's own rounding may be faster"
                 )
-        if (horizon := self.horizon) is not None:
-            at = next(column.tolerance for column in self.columns if column.horizon == horizon)
-            lines.append(f"from t = {horizon:.4g} on these two cannot be compared at {at:g}")
-        lines += self.events.lines(self.parted)
+            if column.horizon is not None:
+                at = f"at {column.tolerance:g}"
+                lines.append(
+                    f"{column.name}: from t = {column.horizon:.{digits}g} on these two cannot be compared {at}"
+                )
+        lines += [self.events.words] * bool(self.events.words)
+        if self.parted is not None:
+            text = f"they part at t = {self.parted:.{digits}g}"
+            if (event := self.events.last_before(self.parted)) is not None:
+                text += f", after the event at t = {event[0]:.{digits}g} {event[1]}"
+            lines.append(text)
         for finding in self.findings:
-            numbers = "" if finding.value is None else f"{finding.value:.3g}, {finding.threshold_text}, "
+            numbers = "" if finding.value is None else f"{_apart(finding.value, finding.admissible[1])}, "
             lines.append(f"{'FAIL' if finding.failed else 'PASS'}  {finding.title}: {numbers}{finding.note}")
         return [line.replace("\n", r"\n") for line in lines]
 
@@ -242,8 +218,8 @@ class Comparison:
             "columns": [
                 {
                     "column": column.name,
-                    "largest": float(column.gap.size.max()),
-                    "time": float(column.gap.t[column.gap.size.argmax()]),
+                    "largest": float(column.gap.size[column.largest]),
+                    "time": float(column.gap.t[column.largest]),
                     "tolerance": column.tolerance,
                     "horizon": column.horizon,
                     "growth_rate": finite_or_none(column.growth.rate),
@@ -282,7 +258,8 @@ def compare(
     Raises
     ------
     ValueError
-        if the runs share no column or no times, or the twins should decide and there are none
+        If the runs share no column or no times, the twins should decide and there are none, or a tolerance is no
+        number of 0 or more.
     """
     runs = (first, second, *twins, *twins_of_second)
     if tolerance is None and not twins and not twins_of_second:
@@ -293,8 +270,17 @@ def compare(
     shared = [name for name in columns or first.columns if all(name in run.columns for run in runs)]
     if not shared:
         raise ValueError(f"{' and '.join(run.label for run in runs)} have no column in common")
+    if isinstance(tolerance, Mapping) and (lacking := [name for name in shared if name not in tolerance]):
+        raise ValueError(f"tolerance names {', '.join(tolerance)}; {', '.join(lacking)} are compared, too")
+    tolerances = {
+        name: 0.0 if tolerance is None else float(tolerance[name] if isinstance(tolerance, Mapping) else tolerance)
+        for name in shared
+    }
+    for name, value in tolerances.items():
+        if not 0.0 <= value < math.inf:
+            raise ValueError(f"tolerance = {value!r} of {name} is outside [0, inf)")
     notes = [
-        f"{name} is not compared: not every run has it"
+        f"{name or 'a column without a name'} is not compared: not every run has it"
         for name in dict.fromkeys(name for run in runs for name in run.columns)
         if columns is None and name not in shared
     ]
@@ -305,10 +291,18 @@ def compare(
         repeated = np.diff(run.t) == 0.0
         if n_between := np.count_nonzero(repeated[1:] & repeated[:-1]):
             notes.append(f"{run.label}: {n_between} rows between the first and the last of one time are not compared")
-    compared = []
-    for name in shared:
-        admissible = 0.0 if tolerance is None else tolerance[name] if isinstance(tolerance, Mapping) else tolerance
-        compared.append(_column(name, first, second, twins, twins_of_second, admissible, shift))
+    for run, others in ((first, twins), (second, twins_of_second)):
+        for twin in others:
+            if twin.t[-1] < min(first.t[-1], second.t[-1]):
+                notes.append(f"{twin.label} ends at t = {twin.t[-1]:.6g}: nothing later can be compared")
+            if all(np.array_equal(twin.columns[name], run.columns[name]) for name in shared):
+                notes.append(f"{twin.label} is equal to {run.label}: it shows nothing")
+    for name, value in tolerances.items():
+        if value > (size := float(max(np.ptp(run.columns[name]) for run in (first, second)))) > 0.0:
+            notes.append(f"{name}: the tolerance, {value:g}, exceeds all of its change, {size:.3g}")
+    compared = [
+        _column(name, first, second, twins, twins_of_second, value, shift) for name, value in tolerances.items()
+    ]
     return Comparison(
         first=first.label,
         second=second.label,
@@ -323,24 +317,25 @@ def _column(
     shift: float,
 ) -> Column:  # fmt: skip
     min_jump = tolerance or TOLERANCE * float(np.ptp(first.columns[name]))
-    changes = []
+    changes, shifts = [], np.full(len(first.t), shift)
     for run, run_twins in ((first, twins), (second, second_twins)):
-        gaps = [gap(run, twin, name, shift=np.inf, min_jump=min_jump) for twin in run_twins]
+        gaps = [gap(run, twin, name, shift=np.full(len(run.t), np.inf), min_jump=min_jump) for twin in run_twins]
         changes.append(gaps)
-        shift += SAFETY * max((float(np.abs(g.matched.shift).max(initial=0.0)) for g in gaps), default=0.0)
-    difference = gap(first, second, name, shift=shift, min_jump=min_jump)
+        for matched in (g.matched for g in gaps):
+            rows = np.searchsorted(first.t, np.minimum(matched.pairs.min(axis=1, initial=np.inf), first.t[-1]))
+            so_far = np.zeros(len(first.t))
+            np.maximum.at(so_far, rows, SAFETY * np.abs(matched.shift))
+            shifts = np.maximum(shifts, shift + np.maximum.accumulate(so_far))
+    difference = gap(first, second, name, shift=shifts, min_jump=min_jump)
     change = sum((_largest_change(gaps, difference.t) for gaps in changes), np.zeros(len(difference.t)))
     band = SAFETY * np.maximum.accumulate(change)
-    comparable = np.ones(len(band), bool) if not tolerance else band <= 0.5 * tolerance
-    not_comparable = np.flatnonzero(~comparable)
-    if tolerance:
-        comparable = comparable & (difference.error <= 0.5 * tolerance)
+    known = np.ones(len(band), bool) if not tolerance else band <= 0.5 * tolerance
     nonzero = np.flatnonzero(change > 0.0)
     crossing = first_crossing(difference.t, np.where(np.isfinite(change), change, np.finfo(float).max), min_jump)
     stop = math.inf if crossing is None else crossing
     growth = fit_growth(difference.t, change, stop=stop) if len(nonzero) else Growth()
     last_digit = None
-    if len(changes[0]) == 1 and crossing is not None and growth.rate > 0.0 and growth.clear:
+    if len(changes[0]) == 1 and crossing is not None and growth.rate > 0.0 and growth.clear and not growth.power:
         initial = changes[0][0].size[0]
         value = abs(float(first.columns[name][0]))
         ulp = float(np.spacing(value))
@@ -350,28 +345,49 @@ def _column(
         name=name,
         gap=difference,
         band=band,
-        comparable=comparable,
+        known=known,
         tolerance=tolerance,
-        horizon=float(difference.t[not_comparable[0]]) if len(not_comparable) else None,
         growth=growth,
         last_digit=last_digit,
     )
 
 
 def _largest_change(gaps: Sequence[Gap], t: FloatArray) -> FloatArray:
-    """Return the largest change by a twin at the times ``t``; infinite where a twin does not exist."""
-    sizes = [np.interp(t, gap.t, gap.size, left=np.inf, right=np.inf) for gap in gaps]
+    """Return the largest change by a twin at the times ``t``, beyond interpolation; infinite where a twin has none."""
+    sizes = [np.interp(t, g.t, np.maximum(0.0, g.size - 2.0 * g.error), left=np.inf, right=np.inf) for g in gaps]
     return np.max(sizes, axis=0) if sizes else np.zeros(len(t))
 
 
 def _events(first: Curves, second: Curves, columns: Sequence[Column], shift: float) -> Matched:
-    """Match the events that both runs list, or else the jumps of all columns."""
+    """Return the events that both runs list, matched, or else the jumps of all columns."""
     if first.t_events is not None and second.t_events is not None:
-        step = max(float(np.median(np.diff(run.t))) for run in (first, second))
-        t_end = min(first.t[-1], second.t[-1])
-        times = [run.t_events[run.t_events <= t_end] for run in (first, second) if run.t_events is not None]
-        return match(times[0], times[1], shift + step)
-    return max((column.gap.matched for column in columns), key=lambda matched: len(matched.pairs) + len(matched.lone))
+        end = min(first.t[-1], second.t[-1])
+        a, b = (
+            listed(run.t, np.arange(len(run.t), dtype=float), run.t_events).until(end)
+            for run in (first, second)
+            if run.t_events is not None
+        )
+        return match(a, b, np.full(len(a.time), shift))[0]
+    pairs, lone = (
+        np.concatenate([getattr(column.gap.matched, name) for column in columns]) for name in ("pairs", "lone")
+    )
+    resolution = max(column.gap.matched.resolution for column in columns)
+    return Matched(np.unique(pairs, axis=0), np.unique(lone, axis=0), resolution)
+
+
+def _apart(value: float, allowed: float) -> str:
+    """Return a difference and what is admissible, in as many digits as tell them apart."""
+    digits = next((k for k in range(3, 17) if f"{value:.{k}g}" != f"{allowed:.{k}g}"), 17)
+    return f"{value:.{digits}g} {'≤' if value <= allowed else '>'} {allowed:.{digits}g}"
+
+
+def _growth_text(growth: Growth) -> str:
+    if not math.isfinite(growth.rate):
+        return "has too few points above round-off for a rate of growth"
+    if growth.power or not growth.clear:
+        return "does not grow exponentially"
+    way = "grows" if growth.rate > 0.0 else "shrinks"
+    return f"{way} at {abs(growth.rate):.3g} per unit of time (standard error {growth.error:.2g})"
 
 
 def _slug(name: str) -> str:

@@ -14,9 +14,6 @@ IndexArray = NDArray[np.int64]
 RATIO: Final = 6.0
 """A change this many times as fast as its neighbours is a jump."""
 
-MAX_EVENTS: Final = 2000
-"""Number of events of a run that are matched."""
-
 
 def closest(first: FloatArray, second: FloatArray, in_first: IndexArray, in_second: IndexArray) -> IndexArray:
     """Match as many as possible in order, with the smallest sum of shifts; return indices, shape (2, K)."""
@@ -39,10 +36,30 @@ def closest(first: FloatArray, second: FloatArray, in_first: IndexArray, in_seco
 
 
 class Jumps(NamedTuple):
-    """Times of the jumps of a column, the middle of the step in which each lies, and the usual step of its output."""
+    """Jumps of a column.
+
+    Parameters
+    ----------
+    time : (K,) - the middle of the step in which each lies
+    width : (K,) - length of that step
+    row : (K,) - the first row after each
+    step : the usual step of the output
+    """
 
     time: FloatArray
+    width: FloatArray
+    row: IndexArray
     step: float
+
+    def until(self, end: float) -> Jumps:
+        """Return those up to a time."""
+        kept = self.time <= end
+        return Jumps(self.time[kept], self.width[kept], self.row[kept], self.step)
+
+
+def _median_step(t: FloatArray) -> float:
+    h = np.diff(t)
+    return float(np.median(h[h > 0.0])) if (h > 0.0).any() else 0.0
 
 
 def jumps(t: FloatArray, values: FloatArray, min_jump: float) -> Jumps:
@@ -51,47 +68,64 @@ def jumps(t: FloatArray, values: FloatArray, min_jump: float) -> Jumps:
     Changes below ``min_jump`` are not jumps, nor is a peak of one row, which is two adjacent changes.
     """
     h, change = np.diff(t), np.abs(np.diff(values))
-    median_step = float(np.median(h[h > 0.0])) if (h > 0.0).any() else 0.0
     rate = np.divide(change, h, out=np.zeros_like(h), where=h > 0.0)
     padded = np.pad(rate, 2)
     neighbours = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)
     is_jump = (change > min_jump) & ((h == 0.0) | ((rate > RATIO * neighbours) & (h > 0.0)))
-    return Jumps((t[:-1][is_jump] + t[1:][is_jump]) / 2.0, median_step)
+    row = np.flatnonzero(is_jump) + 1
+    return Jumps((t[row - 1] + t[row]) / 2.0, h[row - 1], row, _median_step(t))
+
+
+def listed(t: FloatArray, values: FloatArray, t_events: FloatArray) -> Jumps:
+    """Return the events that a run lists, after its first row and up to its last.
+
+    A row at the very time of an event may be that before or after it: the event lies where the column changes most.
+    """
+    t_events = t_events[(t_events > t[0]) & (t_events <= t[-1])]
+    low = np.maximum(np.searchsorted(t, t_events, "left"), 1)
+    high = np.minimum(np.searchsorted(t, t_events, "right"), len(t) - 1)
+    change = np.abs(np.diff(values))
+    row = np.array([a + int(np.argmax(change[a - 1 : max(a, b)])) for a, b in zip(low, high, strict=True)], np.int64)
+    _, unique = np.unique(row, return_index=True)  # of events in one step the first
+    return Jumps(t_events[unique], np.zeros(len(unique)), row[unique], _median_step(t))
 
 
 class Matched(NamedTuple):
     """Events of two runs: ``pairs`` of times, shape (K, 2), and those of one run alone, ``lone``, shape (K, 2).
 
-    A row of ``lone`` is the time and 0 for the first run, 1 for the second.
+    A row of ``lone`` is the time and 0 for the first run, 1 for the second. ``resolution`` is the longer output step.
     """
 
     pairs: FloatArray
     lone: FloatArray
+    resolution: float
 
     @property
     def shift(self) -> FloatArray:
         """Time in the second minus time in the first."""
         return np.asarray(self.pairs[:, 1] - self.pairs[:, 0])
 
-    def lines(self, parted: float | None) -> list[str]:
-        """Return how many events agree, and which one comes before the time at which the runs part."""
+    @property
+    def words(self) -> str:
+        """How many events agree; empty if there are none."""
         if not len(self.pairs) and not len(self.lone):
-            return []
+            return ""
         text = f"events: {len(self.pairs)} in both"
         if len(self.pairs):
             shift = float(np.abs(self.shift).max())
             text += f", at most {shift:.3g} apart" if shift else ", at the same times as far as these are given"
         counts = [int((self.lone[:, 1] == run).sum()) for run in (0, 1)]
-        lines = [f"{text}; {counts[0]} in the first alone, {counts[1]} in the second alone"]
-        if parted is None:
-            return lines
-        earlier = [(time, f"that only the {('first', 'second')[int(run)]} run has") for time, run in self.lone]
-        earlier += [(min(pair), f"that is {abs(pair[1] - pair[0]):.3g} apart in the two") for pair in self.pairs]
-        earlier = [event for event in earlier if event[0] <= parted]
-        if earlier:
-            time, difference = max(earlier)
-            lines.append(f"they part at t = {parted:.6g}, after the event at t = {time:.6g} {difference}")
-        return lines
+        return f"{text}; {counts[0]} in the first alone, {counts[1]} in the second alone"
+
+    def last_before(self, parted: float) -> tuple[float, str] | None:
+        """Return the last event up to a time if the runs do not agree on it, and how; None otherwise."""
+        events = [(time, f"that only the {('first', 'second')[int(run)]} run has") for time, run in self.lone]
+        events += [
+            (float(min(pair)), f"that is {shift:.3g} apart in the two" if shift > self.resolution else "")
+            for pair, shift in zip(self.pairs, np.abs(self.shift), strict=True)
+        ]
+        last = max((event for event in events if event[0] <= parted), default=None)
+        return last if last and last[1] else None
 
     def to_mapping(self) -> dict[str, object]:
         """Return the times as JSON-ready data."""
@@ -99,11 +133,28 @@ class Matched(NamedTuple):
         return {"both": self.pairs.tolist(), **alone}
 
 
-def match(first: FloatArray, second: FloatArray, within: float) -> Matched:
-    """Match events in order, as many as lie ``within`` of each other; only the first ``MAX_EVENTS`` of a run count."""
-    first, second = first[:MAX_EVENTS], second[:MAX_EVENTS]
-    j, k = closest(first, second, np.arange(len(first)), np.arange(len(second)))
-    close = np.abs(second[k] - first[j]) <= within
+def match(first: Jumps, second: Jumps, shift: FloatArray) -> tuple[Matched, IndexArray, IndexArray]:
+    """Match jumps in order, as many as lie within ``shift`` (K,) and one step of each other; also return their indices.
+
+    The step is the longer of the two usual ones and of those in which the two jumps lie. Jumps farther apart from all
+    others than any may be are matched by themselves, so that many cost no more than their number.
+    """
+    step = max(first.step, second.step, *first.width, *second.width)
+    reach = (float(np.max(shift, initial=0.0)) + step) * (1.0 + 1e-6)
+    times, run = np.concatenate([first.time, second.time]), np.repeat([0, 1], [len(first.time), len(second.time)])
+    order = np.argsort(times, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(times[order]) > reach) + 1)
+    pairs = [
+        closest(first.time, second.time, group[run[group] == 0], group[run[group] == 1] - len(first.time))
+        for group in groups
+        if len(np.unique(run[group])) == 2
+    ]
+    j, k = np.concatenate(pairs, axis=1) if pairs else np.zeros((2, 0), np.int64)
+    slack = np.finfo(float).eps * 64 * np.abs(np.concatenate([first.time, second.time, [0.0]])).max()
+    bound = np.maximum(np.maximum(first.width[j], second.width[k]), max(first.step, second.step))
+    bound = (bound + shift[j]) * (1.0 + 1e-6) + slack
+    close = np.abs(second.time[k] - first.time[j]) <= bound
     j, k = j[close], k[close]
-    lone = [(time, 0.0) for time in np.delete(first, j)] + [(time, 1.0) for time in np.delete(second, k)]
-    return Matched(np.stack([first[j], second[k]], axis=1), np.array(sorted(lone)).reshape(-1, 2))
+    lone = [(time, 0.0) for time in np.delete(first.time, j)] + [(time, 1.0) for time in np.delete(second.time, k)]
+    pairs_of_times = np.stack([first.time[j], second.time[k]], axis=1)
+    return Matched(pairs_of_times, np.array(sorted(lone)).reshape(-1, 2), max(first.step, second.step)), j, k

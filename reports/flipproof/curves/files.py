@@ -84,6 +84,8 @@ def curves(
     if not arrays:
         others = ", ".join(f"{name!r} {np.shape(table[name])}" for name in names if name not in (time, "t_events"))
         shapes = f" {t.shape}, but {shortened(others, 80)}" if others else ""
+        if any(np.ndim(table[name]) > 1 for name in names):
+            shapes += "; save the rows of an array as columns of their own,"
         raise ValueError(f"{label}: has no column beside {time!r}{shapes} to compare")
     events = None if t_events is None else np.sort(_numbers(label, "t_events", t_events))
     return Curves(label, t, arrays, events)

@@ -11,10 +11,14 @@ from slicemodel.trajectory import FloatArray
 
 
 class Growth(NamedTuple):
-    """Exponential growth rate of a difference [1/s] with its standard error; NaN if it cannot be fitted."""
+    """Exponential growth rate of a difference [1/s] with its standard error; NaN if it cannot be fitted.
+
+    ``power``: a power of the time since the first row describes it better.
+    """
 
     rate: float = math.nan
     error: float = math.nan
+    power: bool = False
 
     @property
     def clear(self) -> bool:
@@ -55,12 +59,18 @@ def fit_growth(t: FloatArray, size: FloatArray, stop: float = math.inf) -> Growt
         return Growth()
     x = np.array([times[window == w].mean() for w in filled])
     y = np.array([np.median(logs[window == w]) for w in filled])
+    rate, scatter = _line(x, y)
+    power = _line(np.log(x - t[0]), y)[1] < scatter
+    error = math.sqrt(len(x) / (len(x) - 2)) * scatter / math.sqrt(float(((x - x.mean()) ** 2).sum()))
+    return Growth(rate, error, power)
+
+
+def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Return the median slope between all pairs of points, and the scatter about a line with it."""
     i, j = np.triu_indices(len(x), 1)
-    rate = float(np.median((y[j] - y[i]) / (x[j] - x[i])))
-    residual = y - rate * x
-    scatter = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
-    scatter *= math.sqrt(len(x) / (len(x) - 2))
-    return Growth(rate, scatter / math.sqrt(float(((x - x.mean()) ** 2).sum())))
+    slope = float(np.median((y[j] - y[i]) / (x[j] - x[i])))
+    residual = y - slope * x
+    return slope, 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
 
 
 def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:

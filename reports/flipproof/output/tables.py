@@ -77,6 +77,9 @@ def read_curve(path: Path) -> Curve:
     if {*IN_FLIGHT} <= {*names}:
         rows, release = _flight_in(path, names, rows)
         notes = (f"{path}: rows in flight, times from the release at {release:.6g} s",)
+    elif ignored := [name for name in names if name not in ("t", *quantities)]:
+        columns = f"{shortened(', '.join(ignored), 80)} {'is' if len(ignored) == 1 else 'are'}"
+        notes = (f"{path}: {columns} not compared; --columns compares any",)
     series: dict[str, tuple[FloatArray, FloatArray]] = {}
     for name in quantities:
         t, values = _series(path, names, rows, name)
@@ -116,6 +119,10 @@ def _flight_in(path: Path, names: list[str], rows: Rows) -> tuple[Rows, float]:
     return rows, float(t[0] - share[0] * (t[-1] - t[0]) / (share[-1] - share[0]))
 
 
+SEPARATORS: Final = {";": "semicolons", "\t": "tabs"}
+"""What other programs separate columns by."""
+
+
 def read_cells(path: Path) -> tuple[list[str], Rows]:
     """Return the names of a table's columns, and line number and cells of every row that is not blank.
 
@@ -132,6 +139,10 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
     if not numbered:
         raise ValueError(f"{path}: is empty")
     names = [name.strip() for name in _split(numbered[0][1])]
+    if len(names) == 1 and (other := next((name for mark, name in SEPARATORS.items() if mark in names[0]), "")):
+        raise ValueError(
+            f"{path}: line {numbered[0][0]} has {other}: separate columns by commas, and write 0.5, not 0,5"
+        )
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"{path}: line {numbered[0][0]} names the column {twice!r} twice")
