@@ -213,7 +213,7 @@ def test_an_outcome_is_certified_if_half_the_step_and_the_twins_end_alike(
 
 @pytest.mark.long
 @pytest.mark.parametrize("beside", [(-2e-3, 2e-3), pytest.param((-0.03, 0.04), marks=pytest.mark.slow)])
-@pytest.mark.parametrize("law", ["together", "in-turn"])
+@pytest.mark.parametrize("law", ["together", pytest.param("in-turn", marks=pytest.mark.slow)])
 def test_near_an_edge_between_outcomes_the_engine_certifies_nothing_false(law, beside):
     """Certificates 2e-3 to 0.04 of omega beside the edge of the event-driven landing; at it, none at all."""
     start = flown(3)

@@ -294,7 +294,7 @@ def test_an_entry_of_another_run_is_not_taken_for_it(place):
     assert found(place, other) is None
 
 
-@pytest.mark.parametrize("content", [b"", b"no database", b"SQLite format 3\0 and rubbish" * 500])
+@pytest.mark.parametrize("content", [b"", b"no database", b"SQLite format 3\0 and rubbish" * 500], ids=len)
 def test_a_file_that_is_no_database_is_replaced(place, content):
     place.parent.mkdir()
     place.write_bytes(content)

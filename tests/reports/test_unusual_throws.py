@@ -46,14 +46,12 @@ SAYS = {
 NOT_OF_ICE = {"differences", "frozen", "overlap", "step-size", "waterfall"}
 """Figures that have nothing to show if nothing moves."""
 
-TOGETHER = ("weightless, other spin", "elastic", "full")
-"""What a push throws together, and alone only among the long forms."""
+LONG = ("short", "weightless, other spin", "elastic", "full")
+"""What is thrown alone only among the long forms; of the last three, all together is thrown on every push."""
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in TOGETHER)) for name in UNUSUAL]
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in UNUSUAL])
 def test_unusual_throws_have_a_report_too(name, read_page):
     """No failed regression, no warning, no NaN in the page: a regression claim is not the user's throw to break."""
     values = {"n_slices": 8, "drag": 0.5} | UNUSUAL[name]

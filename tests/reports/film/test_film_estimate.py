@@ -358,6 +358,7 @@ def test_ice_tells_nothing_of_drag():
     assert "  restitution  –  not in this equation" in judged.lines()
 
 
+@pytest.mark.slow
 def test_rods_have_no_restitution_and_no_number_of_slices():
     made = film_of(clip(6, fps=30))
     judged = Assessment(estimate(made, THROW, "rods"))

@@ -469,7 +469,10 @@ def judged(kind, knobs):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("frozen_grid", {"slices": 2, "restitution": 0.0, "damping": 0.0}), ("euler_located", {"slices": 17})],
+    [
+        pytest.param("frozen_grid", {"slices": 2, "restitution": 0.0, "damping": 0.0}, marks=pytest.mark.slow),
+        ("euler_located", {"slices": 17}),
+    ],
 )
 def test_errors_that_fall_by_leaps_are_confirmed_at_finer_steps(name, words):
     """Impacts that wait for the grid, or order 1: three levels agree by chance, farther off than they differ."""
@@ -539,6 +542,7 @@ def test_what_an_impact_spoils_is_named_as_the_impacts():
     assert result_of("inputs", Subject, restitution=lambda s, _, side: s.e * (side > 0)).verdict == PASSED
 
 
+@pytest.mark.slow
 def test_a_rest_that_holds_too_long_is_seen_and_named():
     held = replace(
         patches("right")["eq8_as_switches"],
@@ -670,10 +674,14 @@ def test_a_speed_after_impacts_that_is_right_without_and_with_all_of_it_is_named
     assert "right where e is 0 or 1" in drive(simpler_throws_advice(solver.traits, "eq8"), solver)
 
 
-def test_an_equation_can_be_asked_for_and_what_spoils_it_is_named():
+def test_an_equation_can_be_asked_for():
     (result,) = certify(InProcess(Subject(), "x"), ["equation"], equation="eq8").results
     assert result.verdict == FAILED
     assert result.observation.expected == "eq8"
+
+
+@pytest.mark.slow
+def test_what_spoils_an_equation_is_named():
     (result,) = certify(InProcess(MISTAKES["Weight"](), "x"), ["equation"]).results
     assert "right without weight" in result.line
 
@@ -784,7 +792,12 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("by_angle_row_before", "velocity", "r is that of the output before"),
         ("taylor_speed_after", "definitions", "off by 0.5 of the largest speed"),
         ("taylor_sorts_start", "inputs", "slices keep the order of ask.start"),
-        ("dense853_mean_of_water", "piecewise", "in which drag is taken against mean(v) instead of v_CM"),
+        pytest.param(
+            "dense853_mean_of_water",
+            "piecewise",
+            "in which drag is taken against mean(v) instead of v_CM",
+            marks=pytest.mark.slow,
+        ),
         ("frozen_grid_solid_cylinder", "angular-momentum", "M_b (R^2/2 + L^2/12) counts 0.945 times"),
         ("frozen_grid_ice_from_upright", "ice", "at all later times: let theta go on from theta_0"),
         ("frozen_grid_inertia_one_step_late", "angle", "omega is that of 0.00031 s earlier than theta"),
@@ -798,7 +811,9 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("dopri_no_parallel_axis", "definitions", "M_b (L/2 - r_CM)^2 is missing in J"),
         ("dopri_dense_output_slope", "velocity", "look at how r and v are answered between two steps"),
         ("printed_fixed_decimals", "digits", "6 decimals of every number"),
-        ("lists_gravity_of_earth", "piecewise", "as if g were 9.81 m/s^2 where it is 0"),
+        pytest.param(
+            "lists_gravity_of_earth", "piecewise", "as if g were 9.81 m/s^2 where it is 0", marks=pytest.mark.slow
+        ),
         ("picard_first_found_hit", "piecewise", "goes on as if it had not: look at how impacts are found in a step"),
         ("picard_output_in_cut_pieces", "piecewise", "above all one that an event cuts short"),
         ("picard_iteration_stops_early", "piecewise", "at iterations that end early"),
@@ -816,7 +831,9 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("taylor_momentum_without_radius", "start", "J_0 in J_0 omega_0 is not the J of the start"),
         ("taylor_no_second_bounce_in_step", "definitions", "look at impacts that a step misses"),
         ("taylor_angle_wrapped", "piecewise", "theta is off by whole turns: do not wrap it"),
-        ("kutta38_theta_wrapped", "angle", "theta is off by whole turns: do not wrap it"),
+        pytest.param(
+            "kutta38_theta_wrapped", "angle", "theta is off by whole turns: do not wrap it", marks=pytest.mark.slow
+        ),
         ("rootfinder_dense_output_sign", "velocity", "r jumps between times asked: look at how r and v"),
         ("axial_positions_from_first_centre", "angular-momentum", "omega is right, but not J: look at how r is made"),
         ("axial_momentum_about_tube", "start", "J_0 and J are to have one definition"),
@@ -836,8 +853,18 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("pyport_velocity_as_printed", "published-vectors", "look at the step of the velocity: it strikes no end"),
         ("tumbler_rest_speed", "piecewise", "rests from then on: look at the speed below which a slice rests"),
         ("labradau_answer_centre_of_water", "start", "as the answered inertia shows"),
-        ("bulirsch_mean_of_movers", "piecewise", "in which v_CM takes the mean velocity of the flying slices"),
-        ("adams_pece_last_impact_first", "piecewise", "whether the earliest of several comes first"),
+        pytest.param(
+            "bulirsch_mean_of_movers",
+            "piecewise",
+            "in which v_CM takes the mean velocity of the flying slices",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "adams_pece_last_impact_first",
+            "piecewise",
+            "whether the earliest of several comes first",
+            marks=pytest.mark.slow,
+        ),
         ("pyport_slice_at_the_cap", "published-vectors", "the program does not turn it back there"),
         ("events_reaction_on_total", "definitions", "the drag of the slices moves the mass of bottle and water"),
         ("events_dense_digit", "velocity", "look at the coefficients of answers between two steps"),
@@ -848,8 +875,18 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ),
         ("collocation_root_truncated", "order-before-impacts", "look for a constant of few digits"),
         ("expint_rests_too_early", "restitution", "where a slice would leave the cap at 0.004 omega_0 L"),
-        ("series_rests_too_soon", "restitution", "where a slice would leave the cap at 0.008 omega_0 L"),
-        ("angle_rk4_sticks_early", "restitution", "where a slice would leave the base at 0.0015 omega_0 L"),
+        pytest.param(
+            "series_rests_too_soon",
+            "restitution",
+            "where a slice would leave the cap at 0.008 omega_0 L",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "angle_rk4_sticks_early",
+            "restitution",
+            "where a slice would leave the base at 0.0015 omega_0 L",
+            marks=pytest.mark.slow,
+        ),
         *(
             pytest.param(*each, marks=pytest.mark.slow)
             for each in (
@@ -898,7 +935,7 @@ def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, 
     assert advice in result.line
 
 
-@pytest.mark.parametrize("right", ["single", "expint", "series", "rootfinder"])
+@pytest.mark.parametrize("right", ["single", "expint", pytest.param("series", marks=pytest.mark.slow), "rootfinder"])
 def test_slow_impacts_of_right_solvers_rebound(right):
     """The first counts in single precision, in which the lowest rebounds are lost to rounding."""
     (result,) = certify(InProcess(LISTS["right"][right].solver(), right), ["restitution"]).results
