@@ -155,6 +155,44 @@ def test_what_interpolation_hides_is_not_said_to_agree():
     assert compare(of(np.sin(t), t), of(np.sin(times), times), tolerance=0.02).passed
 
 
+def test_times_of_day_are_told_apart():
+    """At 1.7e9 s a time has seven digits after the point; half a row later is another time, a row and a half a miss."""
+    t = 1.7e9 + 1e-3 * np.arange(40)
+    half, late = t + 5e-4, t + 1.5e-3
+    assert compare(of(10 * (t - t[0]), t), of(10 * (half - t[0]), half)).passed
+    assert not compare(of(10 * (t - t[0]), t), of(10 * (t - t[0]), late)).passed
+
+
+@pytest.mark.parametrize("listed", [False, True])
+def test_a_branch_of_one_row_leads_nowhere(listed):
+    t, times = np.linspace(0.0, 1.18, 119), np.linspace(0.0, 1.176, 99)
+    runs = []
+    for grid in (t, times):
+        speed = np.where(grid < 0.4515, -9.81 * grid, 3.1 - 9.81 * (grid - 0.4515))
+        speed = np.where(grid < 1.1745, speed, 2.2 - 9.81 * (grid - 1.1745))
+        runs.append(Curves("run", grid, {"v": speed}, np.array([0.4515, 1.1745]) if listed else None))
+    assert compare(*runs, tolerance=5e-3).passed
+    assert compare(*runs[::-1], tolerance=5e-3).passed
+
+
+@pytest.mark.parametrize("late", [0.003, 0.01, 0.0195])
+@pytest.mark.parametrize("moment", [0.5195, 1.301, 2.22])
+def test_a_jump_may_lie_anywhere_in_its_step(moment, late):
+    t, times = np.arange(0.0, 4.0, 0.02), np.arange(0.0, 4.0, 0.018)
+    assert compare(of(step_at(moment, t), t), of(step_at(moment + late, times), times)).passed
+    assert not compare(of(step_at(moment, t), t), of(step_at(moment + late + 0.06, times), times)).passed
+
+
+def test_events_listed_within_one_step_are_counted_singly():
+    events = np.array([2.01, 2.03, 2.05, 5.0])
+    runs = [Curves("run", COARSE, {"x": step_at(2.02) + step_at(5.0)}, events) for _ in range(2)]
+    found = compare(*runs)
+    assert found.passed
+    assert len(found.events.pairs) == 4
+    other = compare(runs[0], Curves("run", COARSE, runs[0].columns))
+    assert other.notes == ("t_events are not used: one run alone has them",)
+
+
 def test_many_jumps_are_all_matched():
     t = np.arange(30001.0)
     found = compare(of((t // 5) % 2, t), of((np.maximum(t - 1, 0) // 5) % 2, t))
@@ -291,6 +329,9 @@ def test_files_of_any_columns_are_compared(tmp_path, capsys, suffix):
     assert cli.main(["compare", str(a), str(b), "--tolerance", "0.01", "--columns", "x"]) == 0
     assert cli.main(["compare", str(a), str(b), "--columns", "nothing"]) == 2
     assert cli.main(["compare", str(a), str(b), "--from-twins"]) == 2
+    assert cli.main(["compare", str(a), str(b), "--columns", ""]) == 2
+    assert cli.main(["compare", str(a), str(b), "--columns", "x", "--scenario", "nothing.toml"]) == 2
+    assert cli.main(["compare", str(a), str(tmp_path)]) == 2
     capsys.readouterr()
     assert cli.main(["compare", str(a), str(tmp_path / f"missing{suffix}")]) == 2
     assert capsys.readouterr().err.endswith(f"missing{suffix} is no file\n")

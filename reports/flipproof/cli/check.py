@@ -163,7 +163,7 @@ def _compares_any_system(options: argparse.Namespace) -> bool:
     """Return whether two files are to be compared that need not be throws of a bottle."""
     from flipproof.curves.files import SUFFIXES
 
-    for_files = options.columns or options.twin or options.twin_of_b or options.from_twins or options.plot
+    for_files = options.columns is not None or options.twin or options.twin_of_b or options.from_twins or options.plot
     for_files = for_files or options.shift is not None
     paths = Path(options.first), Path(options.second)
     if not all(path.is_file() for path in paths):
@@ -171,7 +171,7 @@ def _compares_any_system(options: argparse.Namespace) -> bool:
             missing = next(path for path in paths if not path.is_file())
             raise ValueError(f"{missing} is no file: --columns, --twin, --from-twins, --shift and --plot compare files")
         for path in paths:
-            if path.suffix in SUFFIXES and not path.is_file():
+            if (path.suffix in SUFFIXES or path.is_dir()) and not path.is_file():
                 raise ValueError(f"{path} is no file")
         return False
     for path in paths:
@@ -190,6 +190,10 @@ def _compare_curves(options: argparse.Namespace) -> int:
     from flipproof.curves.compare import TOLERANCE, compare
     from flipproof.curves.files import read
 
+    if options.columns == ():
+        raise ValueError("--columns names no column")
+    if options.scenario is not None:
+        raise ValueError("--scenario is that of throws; these files may be of anything")
     if options.from_twins and options.tolerance is not None:
         raise ValueError("--from-twins and --tolerance exclude each other")
     if options.plot and options.plot.suffix not in (".png", ".svg"):

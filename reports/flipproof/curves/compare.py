@@ -25,7 +25,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.curves.events import Matched, listed, match
+from flipproof.curves.events import Jumps, Matched, match, median_step
 from flipproof.curves.files import Curves
 from flipproof.curves.gap import Gap, gap
 from flipproof.curves.growth import Growth, first_crossing, fit_growth
@@ -160,6 +160,8 @@ class Comparison:
             note = f"at t = {column.gap.t[k]:.{self.digits}g}, {count} of {len(column.gap.t)} times compared"
             if count < len(column.gap.t):
                 note += ", those at which bands and interpolation leave half of the tolerance"
+            if not column.comparable[k]:
+                note += "; this is none of them: twice the error of interpolation is admissible there"
             value, allowed = float(column.gap.size[k]), float(column.allowed[k])
             band = Band(float(column.band[k]), "twins") if column.band[k] else None
             findings.append(regression(id_, title, value, "", (0.0, allowed), note, band=band))
@@ -169,7 +171,7 @@ class Comparison:
     def digits(self) -> int:
         """Digits of times that tell one output step from the next, 6 to 15."""
         t = self.columns[0].gap.t
-        step, largest = float(np.median(np.diff(t))), float(np.abs(t).max())
+        step, largest = median_step(t), float(np.abs(t).max())
         return int(np.clip(math.ceil(math.log10(largest / step)) + 2, 6, 15)) if step > 0.0 and largest > 0.0 else 6
 
     @property
@@ -180,7 +182,7 @@ class Comparison:
             gap, k = column.gap, column.largest
             text = f"{column.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.{digits}g}"
             if gap.interpolated:
-                text += f" ({gap.interpolated} of {len(gap.t)} times interpolated)"
+                text += f" ({gap.interpolated} of {len(gap.t)} times interpolated, {column.comparable.sum()} compared)"
             if column.band.any():
                 text += f"; the twins' change {_growth_text(column.growth)}"
             lines.append(text)
@@ -280,13 +282,15 @@ def compare(
         if not 0.0 <= value < math.inf:
             raise ValueError(f"tolerance = {value!r} of {name} is outside [0, inf)")
     notes = [
-        f"{name or 'a column without a name'} is not compared: not every run has it"
+        f"{name or 'a column without a name'} is not compared: not every run has it, in the length of its times"
         for name in dict.fromkeys(name for run in runs for name in run.columns)
         if columns is None and name not in shared
     ]
     if first.t[-1] != second.t[-1] or first.t[0] != second.t[0]:
         overlap = max(first.t[0], second.t[0]), min(first.t[-1], second.t[-1])
-        notes.append(f"only t = {overlap[0]:.6g} to {overlap[1]:.6g} is common to both")
+        notes.append(f"only t = {overlap[0]:.15g} to {overlap[1]:.15g} is common to both")
+    if (first.t_events is None) != (second.t_events is None):
+        notes.append("t_events are not used: one run alone has them")
     for run in (first, second):
         repeated = np.diff(run.t) == 0.0
         if n_between := np.count_nonzero(repeated[1:] & repeated[:-1]):
@@ -362,8 +366,9 @@ def _events(first: Curves, second: Curves, columns: Sequence[Column], shift: flo
     """Return the events that both runs list, matched, or else the jumps of all columns."""
     if first.t_events is not None and second.t_events is not None:
         end = min(first.t[-1], second.t[-1])
+        none = np.zeros(0, np.int64)
         a, b = (
-            listed(run.t, np.arange(len(run.t), dtype=float), run.t_events).until(end)
+            Jumps(times := run.t_events[run.t_events <= end], np.zeros(len(times)), none, median_step(run.t))
             for run in (first, second)
             if run.t_events is not None
         )

@@ -57,7 +57,8 @@ class Jumps(NamedTuple):
         return Jumps(self.time[kept], self.width[kept], self.row[kept], self.step)
 
 
-def _median_step(t: FloatArray) -> float:
+def median_step(t: FloatArray) -> float:
+    """Return the usual step of an output; 0 if all times are one."""
     h = np.diff(t)
     return float(np.median(h[h > 0.0])) if (h > 0.0).any() else 0.0
 
@@ -73,7 +74,7 @@ def jumps(t: FloatArray, values: FloatArray, min_jump: float) -> Jumps:
     neighbours = np.max([padded[:-4], padded[1:-3], padded[3:-1], padded[4:]], axis=0)
     is_jump = (change > min_jump) & ((h == 0.0) | ((rate > RATIO * neighbours) & (h > 0.0)))
     row = np.flatnonzero(is_jump) + 1
-    return Jumps((t[row - 1] + t[row]) / 2.0, h[row - 1], row, _median_step(t))
+    return Jumps((t[row - 1] + t[row]) / 2.0, h[row - 1], row, median_step(t))
 
 
 def listed(t: FloatArray, values: FloatArray, t_events: FloatArray) -> Jumps:
@@ -87,7 +88,7 @@ def listed(t: FloatArray, values: FloatArray, t_events: FloatArray) -> Jumps:
     change = np.abs(np.diff(values))
     row = np.array([a + int(np.argmax(change[a - 1 : max(a, b)])) for a, b in zip(low, high, strict=True)], np.int64)
     _, unique = np.unique(row, return_index=True)  # of events in one step the first
-    return Jumps(t_events[unique], np.zeros(len(unique)), row[unique], _median_step(t))
+    return Jumps(t_events[unique], np.zeros(len(unique)), row[unique], median_step(t))
 
 
 class Matched(NamedTuple):
@@ -113,9 +114,10 @@ class Matched(NamedTuple):
         text = f"events: {len(self.pairs)} in both"
         if len(self.pairs):
             shift = float(np.abs(self.shift).max())
-            text += f", at most {shift:.3g} apart" if shift else ", at the same times as far as these are given"
+            apart = f", at most {shift:.3g} apart (output step {self.resolution:.3g})"
+            text += apart if shift else ", at the same times as far as these are given"
         counts = [int((self.lone[:, 1] == run).sum()) for run in (0, 1)]
-        return f"{text}; {counts[0]} in the first alone, {counts[1]} in the second alone"
+        return f"{text}; {counts[0]} found in the first alone, {counts[1]} in the second alone"
 
     def last_before(self, parted: float) -> tuple[float, str] | None:
         """Return the last event up to a time if the runs do not agree on it, and how; None otherwise."""
@@ -134,13 +136,14 @@ class Matched(NamedTuple):
 
 
 def match(first: Jumps, second: Jumps, shift: FloatArray) -> tuple[Matched, IndexArray, IndexArray]:
-    """Match jumps in order, as many as lie within ``shift`` (K,) and one step of each other; also return their indices.
+    """Match jumps in order, as many as may lie within ``shift`` (K,) and one step of each other; also return indices.
 
-    The step is the longer of the two usual ones and of those in which the two jumps lie. Jumps farther apart from all
-    others than any may be are matched by themselves, so that many cost no more than their number.
+    The step is the longer of the two usual ones and of those in which the two jumps lie; a jump may lie anywhere in its
+    step. Jumps farther apart from all others than any may be are matched by themselves, so that many cost no more than
+    their number.
     """
     step = max(first.step, second.step, *first.width, *second.width)
-    reach = (float(np.max(shift, initial=0.0)) + step) * (1.0 + 1e-6)
+    reach = (float(np.max(shift, initial=0.0)) + 2.0 * step) * (1.0 + 1e-6)
     times, run = np.concatenate([first.time, second.time]), np.repeat([0, 1], [len(first.time), len(second.time)])
     order = np.argsort(times, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(times[order]) > reach) + 1)
@@ -151,9 +154,11 @@ def match(first: Jumps, second: Jumps, shift: FloatArray) -> tuple[Matched, Inde
     ]
     j, k = np.concatenate(pairs, axis=1) if pairs else np.zeros((2, 0), np.int64)
     slack = np.finfo(float).eps * 64 * np.abs(np.concatenate([first.time, second.time, [0.0]])).max()
-    bound = np.maximum(np.maximum(first.width[j], second.width[k]), max(first.step, second.step))
-    bound = (bound + shift[j]) * (1.0 + 1e-6) + slack
-    close = np.abs(second.time[k] - first.time[j]) <= bound
+    widths = first.width[j], second.width[k]
+    step = np.maximum(np.maximum(*widths), max(first.step, second.step))
+    # Two rows late on one grid is more than a step late; a listed event may be just a step late.
+    bound = step * np.where(widths[0] + widths[1] > 0.0, 1.0 - 1e-6, 1.0 + 1e-6) + shift[j] + slack
+    close = np.abs(second.time[k] - first.time[j]) - (widths[0] + widths[1]) / 2.0 <= bound
     j, k = j[close], k[close]
     lone = [(time, 0.0) for time in np.delete(first.time, j)] + [(time, 1.0) for time in np.delete(second.time, k)]
     pairs_of_times = np.stack([first.time[j], second.time[k]], axis=1)

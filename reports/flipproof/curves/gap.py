@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flipproof.curves.events import IndexArray, Matched, jumps, listed, match
+from flipproof.curves.events import IndexArray, Matched, jumps, listed, match, median_step
 from flipproof.curves.files import Curves
 from slicemodel.trajectory import FloatArray
 
@@ -22,7 +22,10 @@ SAME_TIME: Final = 1e-12
 """Relative difference of times that printing and reading may cause."""
 
 NEAR_TIME: Final = 1e-3
-"""Fraction of a step by which two times may differ and be one; what the slope changes meanwhile is an error."""
+"""Fraction of a step by which two times may differ at the most and be one.
+
+Where they do, the error of interpolation is what the slope changes meanwhile.
+"""
 
 
 def kept_rows(t: FloatArray, low: float, high: float) -> IndexArray:
@@ -41,7 +44,7 @@ def on_common_times(
     rows = kept_rows(t, times[0], times[-1])
     after = np.diff(t, append=np.inf)[rows] > 0
     t, values = t[rows], values[rows]
-    tolerance = SAME_TIME * max(abs(times[0]), abs(times[-1]))
+    tolerance = min(SAME_TIME * max(abs(times[0]), abs(times[-1])), NEAR_TIME * median_step(times))
     low, high = np.searchsorted(times, t - tolerance, "left"), np.searchsorted(times, t + tolerance, "right") - 1
     coincident = low <= high
     resampled = np.where(after, other_values[high], other_values[np.minimum(low, len(times) - 1)])
@@ -153,10 +156,11 @@ class _Branches:
         return moved, self.values[end] + slope * (t - self.t[end]), np.abs(slope), np.abs(t - self.t[end])
 
     def extrapolation_error(self, side: IndexArray, beyond: FloatArray) -> FloatArray:
-        """Estimate the error of values that lie ``beyond`` a branch: |y''| d (d + h) / 2."""
-        h = float(np.median(self.h[self.h > 0.0])) if (self.h > 0.0).any() else 0.0
+        """Estimate the error of values that lie ``beyond`` a branch: |y''| d (d + h) / 2; one row does not lead on."""
+        h = median_step(self.t)
         curvature = np.maximum(self.curvature[self.first[side]], self.curvature[self.last[side]])
-        return np.asarray(curvature * beyond * (beyond + h) / 2.0)
+        unknown = (self.first[side] == self.last[side]) & (beyond > NEAR_TIME * h)
+        return np.where(unknown, np.inf, curvature * beyond * (beyond + h) / 2.0)
 
 
 def _nearest(values: FloatArray, valid: IndexArray) -> FloatArray:
