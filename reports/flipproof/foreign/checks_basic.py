@@ -396,6 +396,7 @@ def check_angle(traits: Traits) -> CheckGenerator:
     min_ratio = 8.0 if (traits.order or 0.0) >= 2.0 and sizes[-1] > bound else 3.0
     holds = sizes[0] <= bound or (_falls(sizes, min_ratio) and sizes[-1] <= 100 * bound)
     hint = "" if holds else _times_advice(answers[0]) or _jump_advice(asks[0].times, answers[0].omega / THROW.omega0)
+    last_alone = not (holds or hint) and float(errors[0][:-1].max()) <= bound
     turns = errors[0] / (2 * np.pi)
     wrapped = not holds and turns.max() > 0.5 and np.all(np.abs(turns - np.round(turns)) < 0.01)
     if not (holds or hint or wrapped):
@@ -427,6 +428,8 @@ def check_angle(traits: Traits) -> CheckGenerator:
         where=f"flight of {SLOW.duration:g} s" if stops else time_of_max(asks[0].times, errors[0]),
         advice=stall_advice or "fly to the last of ask.times, however late that is"
         if stops
+        else "the row at the end of the flight alone is wrong: look at whether the last step is taken, and answered"
+        if last_alone
         else "theta is off by whole turns: do not wrap it"
         if wrapped
         else f"{hint}theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a "

@@ -112,7 +112,7 @@ def check_refinement(traits: Traits) -> CheckGenerator:
     advice = f"use ask.effort as {traits.refined_by}, or declare no refined_by"
     if not nonzero and not holds and traits.equation and (yield from placing(traits)).equation == traits.equation:
         cause = yield from elsewhere.simpler_throws_advice(traits, traits.equation)
-        advice = f"{cause}{advice}" if cause.startswith("right") else advice
+        advice += f"; if it is used, {cause.removesuffix('; ')}" if cause.startswith("right") else ""
     if not holds:
         observed += (
             ": steps grow no shorter, ask.effort is ignored from there on" if nonzero else ": ask.effort is ignored"
@@ -201,6 +201,11 @@ def check_order_before(traits: Traits) -> CheckGenerator:
             advice = "of that order where the end alone is asked: look at how an answer between two steps is made"
         for name, throw in CALM.items() if not advice else ():
             orders_without = _orders(traits, (yield from _changes_before(traits, throw, levels)))
+            low_without = [field for field, order in orders_without.items() if order < required]
+            if name == "weight" and low_without == ["theta"] and sum(order < required for order in orders.values()) > 1:
+                advice = "theta is of that order, and the others follow it through the weight: look at how theta is "
+                advice += "advanced, with the omega of which instant"
+                break
             if orders_without and min(orders_without.values()) >= required:
                 advice = (
                     f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}, and whether an "
@@ -218,7 +223,7 @@ def check_order_before(traits: Traits) -> CheckGenerator:
             "how a step begins without them, the instant at which omega, r_CM or J are taken, or how a step is cut to "
             "a time asked, costs the order"
         )
-    if not holds and 0.0 < changes[worst][0] < SLIGHT:
+    if not holds and 0.0 < changes[worst][0] < SLIGHT and not abs(orders[worst] - 1.0) < 0.15:  # order 1: no digits
         advice = (
             f"already at the longest steps {worst} changes by no more than {changes[worst][0]:.0e}: look for a "
             f"constant of few digits, or for single precision; {advice or default_advice}"
@@ -317,7 +322,8 @@ def check_order_across(traits: Traits) -> CheckGenerator:
         where=f"{throws[0].n_slices} to {throws[-1].n_slices} slices, 0.3 s with impacts on both ends, steps of 5 ms "
         "and its halves",
         advice="rebounds answered at the next step give order 1; an order near 0 means that refinement does not help: "
-        "look at how exactly the instant of an impact is found, and at what is done there",
+        "look at how exactly the instant of an impact is found, at what is done there, and at whether a second one in "
+        "the same step is looked for",
         facts={"order_across_impacts": order},
     )
 

@@ -112,7 +112,7 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "end of rests": "when a slice at rest is let go",
     "impacts at one instant": "impacts of several slices at one instant",
     "order of impacts in a step": "several impacts close together: each at its own time, the earliest first",
-    "weight": "the weight",
+    "weight": "the weight, g cos(theta): its size, sign, angle and instant",
     "drag": "the drag, and against what v is measured",
     "no drag": "what is done without drag: is a drag of 0 taken for none given?",
     "no weight": "what is done without weight: is a gravity of 0 taken for none given?",
@@ -271,10 +271,16 @@ def _spoiled(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval
         advice = (
             "look at the instant of the speed with which a slice strikes, and at the rest of the step after the impact"
         )
+    quiet, fine_quiet = (np.median([i.size for i in intervals if not i.hits] or [0.0]) for intervals in (coarse, fine))
+    if fine_quiet > SPOILED and quiet < 6 * fine_quiet:
+        fields = sorted({max(i.departure, key=lambda name: i.departure[name]) for i in fine if not i.hits})
+        also = f"so it is without an impact: look at how {' and '.join(fields)} is advanced in a step, and answered"
+    else:
+        also = f"steps without an impact have a higher order: {advice}"
     return (
         f"at impacts that come alone, by {coarse_size:.1g} of a field's scale (median of {len(lone[0])}) and by "
         f"{fine_size:.1g} at {refined_words(traits)}",
-        f"steps without an impact have a higher order: {advice}",
+        also,
     )
 
 
