@@ -28,10 +28,12 @@ def film(
     bad: int = 0, missing: int = 0, gamma: float = 6.0, e: float = 0.4, omega0: float = 18.0, slices: int = 20,
     duration: float = 0.5, model: str = "free-flight", theta0: float | None = None, hand: float = 0.3,
     swings: bool = False, flick: float = 0.0,
+    softness: float = 0.0,
 ) -> Clip:  # fmt: skip
     """Return a clip; ``tilt`` in degrees, ``bad`` clicks and ``missing`` points fall on frames in flight.
 
     The hand accelerates steadily, or as ``swung`` says, or holds still and flicks the bottle away in ``flick`` seconds.
+    The table stops the base at once, and the bottle falls upright; a soft one slows both by exp(-t / softness).
     """
     theta0 = float(rng.uniform(1.2, 1.9)) if theta0 is None else theta0
     scene = Scenario(water_mass=filling, omega0=omega0, theta0=theta0, restitution=e, duration=duration)
@@ -70,7 +72,14 @@ def film(
         touched = touched + (length - run.r_cm[-1]) * np.array([np.sin(run.theta[-1]), -np.cos(run.theta[-1])])
     axis = np.stack([np.sin(theta), -np.cos(theta)], axis=1)
     cap, base = mass - r[:, None] * axis, mass + (length - r)[:, None] * axis
-    if after.any():
+    if after.any() and softness:
+        lag, spin = softness * (1 - np.exp(-(tau[after] - duration) / softness)), run.omega[-1]
+        across = np.array([np.cos(run.theta[-1]), np.sin(run.theta[-1])])
+        sinking = velocity - np.array([0, g]) * duration + (length - run.r_cm[-1]) * spin * across
+        turned = run.theta[-1] + spin * lag
+        base[after] = touched + np.outer(lag, sinking)
+        cap[after] = base[after] - length * np.stack([np.sin(turned), -np.cos(turned)], axis=1)
+    elif after.any():
         base[after], cap[after] = touched, touched - length * axis[after]
     angle = np.radians(tilt)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

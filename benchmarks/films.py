@@ -1,6 +1,7 @@
 """How often the intervals of ``track`` hold the truth: films of known truth on a fraction of a grid, drawn anew.
 
     python benchmarks/films.py [--films 20] [--first 0] [--slices 6]      coverage, one line a cell
+    python benchmarks/films.py --films 4 --soft 10                        the same on a table that takes 10 ms
     python benchmarks/films.py --spoiled 500 --noise 200                  spoiled and random films: no traceback
     python benchmarks/films.py --late 20                                  late releases, seen without an equation
     python benchmarks/films.py --given 5          widths of intervals, over those with the true release given, and
@@ -35,6 +36,7 @@ from flipproof.film.likelihood import Film, Held, Likelihood
 from slicemodel import Scenario
 
 NAMES = ("gamma", "omega0", "release", "tilt", "restitution")
+COUNTED = (*NAMES, "touch", "g")
 
 
 def cells() -> list[dict[str, Any]]:
@@ -55,23 +57,23 @@ def film_of(made: film_simulator.Clip) -> Film:
     return Film(label="film", t=made.t, values=values, quantity="points", lines=np.arange(len(made.t)))
 
 
-def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int) -> film_simulator.Clip:
+def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int, softness: float = 0.0) -> film_simulator.Clip:
     """Return a film of a cell with a truth drawn anew."""
     truth: dict[str, Any] = {"gamma": rng.uniform(2, 10), "e": rng.uniform(0.1, 0.8), "omega0": rng.uniform(14, 22)}
-    return film_simulator.film(rng, slices=slices, swings=True, **cell, **truth)
+    return film_simulator.film(rng, slices=slices, swings=True, softness=softness, **cell, **truth)
 
 
-def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
+def coverage(films: int, first: int, slices: int, only: list[int], softness: float) -> None:
     """Print for every cell how many intervals hold the truth, and their median width."""
     total: Counter[tuple[str, str]] = Counter()
     for index, cell in enumerate(cells()):
         if only and cell["fps"] not in only:
             continue
         held, refused = Counter[str](), 0
-        widths: dict[str, list[float]] = {name: [] for name in NAMES}
+        widths: dict[str, list[float]] = {name: [] for name in COUNTED}
         began = time.process_time()
         for k in range(first, first + films):
-            made = drawn(np.random.default_rng([index, k]), cell, slices)
+            made = drawn(np.random.default_rng([index, k]), cell, slices, softness)
             throw = Scenario(water_mass=cell["filling"]).with_slices(slices)
             try:
                 judged = Assessment(estimate(film_of(made), throw))
@@ -80,7 +82,7 @@ def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
                 refused += 1
                 print("   refused:", error, flush=True)
                 continue
-            for name in NAMES:
+            for name in COUNTED:
                 if name == "restitution" and judged.verdict(name) == "cannot tell":
                     continue
                 low, high = judged.estimate.interval(name)
@@ -91,12 +93,12 @@ def coverage(films: int, first: int, slices: int, only: list[int]) -> None:
         ]
         spent = (time.process_time() - began) / films
         print(*cell.values(), "|", "; ".join(words), f"| refused {refused}, {spent:.1f} s a film", flush=True)
-        for name, level in product(NAMES, ("all", *(f"{factor} {value}" for factor, value in cell.items()))):
+        for name, level in product(COUNTED, ("all", *(f"{factor} {value}" for factor, value in cell.items()))):
             total[name, level] += held[name]
             total["of " + name, level] += len(widths[name])
     for level in dict.fromkeys(level for _, level in total):
         words = []
-        for name in NAMES:
+        for name in COUNTED:
             count, of = total[name, level], total["of " + name, level]
             low, high = (100 * beta.ppf(q, count + 0.5, of - count + 0.5) for q in (0.025, 0.975))
             words.append(f"{name} {count}/{of} [{low:.0f}, {high:.0f}] %" if of else f"{name} -")
@@ -206,6 +208,7 @@ if __name__ == "__main__":
     for name in ("films", "first", "slices", "spoiled", "noise", "late", "given"):
         parser.add_argument(f"--{name}", type=int, default={"films": 20, "slices": 6}.get(name, 0))
     parser.add_argument("--fps", type=int, nargs="*", default=[], help="cells of these frame rates alone")
+    parser.add_argument("--soft", type=float, default=0.0, help="time in which the table takes velocity and spin [ms]")
     options = parser.parse_args()
     if options.late:
         releases(options.late)
@@ -214,4 +217,4 @@ if __name__ == "__main__":
     elif options.spoiled or options.noise:
         rough(options.spoiled, options.noise, options.first, options.slices)
     else:
-        coverage(options.films, options.first, options.slices, options.fps)
+        coverage(options.films, options.first, options.slices, options.fps, options.soft / 1e3)

@@ -23,7 +23,7 @@ from scipy.optimize import minimize
 from flipproof.film.curves import SLICES, STEP, Curve, Equation
 from flipproof.film.hand import FIRST, LAST, MOTIONS, REACH, SEARCH
 from flipproof.film.kernel.scoring import match_turnings
-from flipproof.film.likelihood import GRAVITY, TOUCH, Film, Fit, Held, Likelihood
+from flipproof.film.likelihood import GRAVITY, TABLES, Film, Fit, Held, Likelihood, Table
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -504,23 +504,27 @@ def _draws(likelihood: Likelihood, grid: Grid) -> dict[str, FloatArray]:
 # ---------------------------------------------------------------------- the touch
 
 
-def _touch_costs(likelihood: Likelihood, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return times of a touch near the likeliest, 16 per frame, the cost of each, and the velocity taken."""
+def _touch_costs(
+    likelihood: Likelihood, curve: Curve, x: FloatArray
+) -> tuple[FloatArray, FloatArray, tuple[float, Table]]:
+    """Return times of a touch near the likeliest, 16 per frame, the cost of each, and the likeliest touch and table."""
     film = likelihood.film
     step = float(np.median(np.diff(film.t)))
-    if likelihood.held.touch is not None or not likelihood.planar or not (film.t > x[0]).any():
-        return np.array([likelihood.touch, likelihood.touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
-    if likelihood.held.table is not None:
-        touch = _table_touch_time(likelihood, curve, x, likelihood.held.table)
-        return np.array([touch, touch + 1e-9]), np.array([0.0, np.inf]), likelihood.speed
+    known = likelihood.held.touch
+    if known is None and (not likelihood.planar or not (film.t > x[0]).any()):
+        known = likelihood.touch
+    if known is None and likelihood.held.table is not None:
+        known = _table_touch_time(likelihood, curve, x, likelihood.held.table)
+    if known is not None:
+        return np.array([known, known + 1e-9]), np.array([0.0, np.inf]), (known, likelihood.table)
     frames = np.append(film.t[film.t > x[0]], film.t[-1] + step)
-    coarse = {speed: likelihood.costs_of_touches(curve, x, frames, speed) for speed in TOUCH}
-    speed = min(coarse, key=lambda velocity: float(coarse[velocity].min()))
-    centre = frames[int(np.argmin(coarse[speed]))]
+    coarse = [likelihood.costs_of_touches(curve, x, frames, table) for table in TABLES]
+    centre = frames[int(np.argmin(np.min(coarse, axis=0)))]
     times = np.minimum(centre + step * np.arange(-32, 33) / 16, film.t[-1] + step)
-    # How fast the table takes the velocity is confounded with when it starts to.
-    costs = [likelihood.costs_of_touches(curve, x, times, velocity) for velocity in TOUCH]
-    return times, -np.asarray(np.logaddexp.reduce(-np.array(costs), axis=0)), speed
+    # How fast a table takes the velocity is confounded with when it starts to.
+    costs = np.array([likelihood.costs_of_touches(curve, x, times, table) for table in TABLES])
+    best, k = np.unravel_index(int(np.argmin(costs)), costs.shape)
+    return times, -np.asarray(np.logaddexp.reduce(-costs, axis=0)), (float(times[k]), TABLES[best])
 
 
 def _table_touch_time(likelihood: Likelihood, curve: Curve, x: FloatArray, height: float) -> float:
@@ -541,11 +545,10 @@ def _table_touch_time(likelihood: Likelihood, curve: Curve, x: FloatArray, heigh
 
 def settle(likelihood: Likelihood, curve: Curve, x: FloatArray) -> Likelihood:
     """Return the likelihood with the most likely touch; the same object if the touch stays."""
-    times, costs, speed = _touch_costs(likelihood, curve, x)
-    touch = float(times[int(np.argmin(costs))])
-    if abs(touch - likelihood.touch) < 1e-9 and speed == likelihood.speed:
+    touch, table = _touch_costs(likelihood, curve, x)[2]
+    if abs(touch - likelihood.touch) < 1e-9 and table == likelihood.table:
         return likelihood
-    return likelihood.replaced(touch=touch, speed=speed)
+    return likelihood.replaced(touch=touch, table=table)
 
 
 # ---------------------------------------------------------------------- the start

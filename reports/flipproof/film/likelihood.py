@@ -6,9 +6,9 @@
 The error of a click has variance v in both coordinates and is normal, but for a share of bad clicks, which may lie
 anywhere in the picture. In flight v = sigma^2. Before the release a hand adds motions to C_M and to theta (``hand``),
 which are fitted, since what a hand does in one frame it does in the next; what they do not describe has the size A,
-and after the touch the table takes the velocity:
+and after the touch a table takes the velocity V in the time T (s = t - t_d):
 
-    v = sigma^2 + (A tau^K/(K! QUICK^(K-2)))^2  before,    v = sigma^2 + (V (t - t_d))^2  after,
+    v = sigma^2 + (A tau^K/(K! QUICK^(K-2)))^2  before,    v = sigma^2 + (V s^2 / (s + T))^2  after,
 
 never beyond the picture.
 
@@ -19,7 +19,7 @@ alone has rows of one coordinate, no hand and no table.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +38,16 @@ BAD: Final = 0.01
 TIGHT: Final = 1e-6
 """Standard deviation of a parameter that is held."""
 
-TOUCH: Final = (1.0, 3.0, 10.0)
-"""Velocities that a table may take [m/s]; the likeliest is used."""
+
+class Table(NamedTuple):
+    """The velocity that a table takes [m/s], and the time in which it does [s]."""
+
+    speed: float
+    softness: float
+
+
+TABLES: Final = tuple(Table(*numbers) for numbers in ((1, 0), (3, 0), (10, 0), (3, 0.01), (3, 0.03), (3, 0.1)))
+"""Tables that are tried; the likeliest is used. Hard ones alone find the touch on a soft table 3 to 14 ms late."""
 
 Quantity = Literal["points", "theta", "omega"]
 
@@ -180,12 +188,12 @@ class Likelihood:
         held: Held,
         touch: float,
         noise: float,
-        speed: float = TOUCH[1],
+        table: Table = TABLES[1],
         count: int = 1,
         rest: Rest = FIRST,
     ) -> None:
-        """Take the touch, a guess of the noise, the velocity the table takes, the hand's motions and their rest."""
-        self.film, self.held, self.touch, self.noise, self.speed, self.rest = film, held, touch, noise, speed, rest
+        """Take the touch, a guess of the noise, the table, the hand's motions and their rest."""
+        self.film, self.held, self.touch, self.noise, self.table, self.rest = film, held, touch, noise, table, rest
         self.area, self.observed = film.area, film.clicked
         self.planar = film.values.shape[2] == 2
         self.count, self.names, self.hands = count, film.names(count), motions(count)
@@ -199,8 +207,8 @@ class Likelihood:
         self.dof = (13 if self.planar else 3) - sum(fixed)
 
     def replaced(self, **changed: Any) -> Likelihood:
-        """Return the same with another film, touch, speed, number of motions or rest."""
-        arguments = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "speed", "count", "rest")}
+        """Return the same with another film, touch, table, number of motions or rest."""
+        arguments = {name: getattr(self, name) for name in ("film", "held", "touch", "noise", "table", "count", "rest")}
         return Likelihood(**arguments | changed)
 
     def _priors(self) -> tuple[FloatArray, FloatArray]:
@@ -259,7 +267,7 @@ class Likelihood:
             slopes[:, -1] = 2 * np.exp(2 * x[-1])
             return np.full(len(t), np.exp(2 * x[-1])), slopes
         bound, rest = self.area / (2 * np.pi), self.rest
-        variance, slopes = variances(t, x, self.touch, self.speed, bound, rest.power, rest.floor)
+        variance, slopes = variances(t, x, self.touch, *self.table, bound, rest.power, rest.floor)
         return variance, slopes
 
     # ------------------------------------------------------------------ densities
@@ -270,14 +278,14 @@ class Likelihood:
         variance, _ = self.variance(x)
         return self._density(self.film.values - values, variance)
 
-    def costs_of_touches(self, curve: Curve, x: FloatArray, times: FloatArray, speed: float) -> FloatArray:
+    def costs_of_touches(self, curve: Curve, x: FloatArray, times: FloatArray, table: Table) -> FloatArray:
         """Return the cost of all clicks if the touch had been at each of some times, shape (len(times),)."""
         values, _ = self.model(curve, x)
         t, bound = self.film.t, self.area / (2 * np.pi)
-        variance, _ = variances(t, x, np.inf, 0.0, bound, self.rest.power, self.rest.floor)
+        variance, _ = variances(t, x, np.inf, *TABLES[0], bound, self.rest.power, self.rest.floor)
         squares = (np.where(self.observed[:, :, None], self.film.values - values, 0.0) ** 2).sum(axis=2)
         return np.asarray(
-            touch_costs(squares, self.observed, variance, t, times, speed, bound, np.log1p(-BAD), self.log_bad)
+            touch_costs(squares, self.observed, variance, t, times, *table, bound, np.log1p(-BAD), self.log_bad)
         )
 
     def _density(self, residuals: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -96,12 +96,18 @@ def points(turning, t, x, hands, spacing):
     return values, slopes
 
 
+@inner
+def table_miss(since, speed, softness):
+    """Return how far the bottle is from its flight after the touch [m], if a table takes ``speed`` in ``softness``."""
+    return speed * since * since / (since + softness) if since > 0.0 else 0.0
+
+
 @kept_on_disk()
-def variances(t, x, touch, speed, bound, power, steady):
+def variances(t, x, touch, speed, softness, bound, power, steady):
     """Return the variance of one coordinate of a click (P,), and its slopes by the inner parameters (P, K).
 
     Before the release a hand adds to it, as a ``power`` of time and at least ``steady`` [m/s^2]; after the touch, a
-    table that takes a velocity ``speed``. Both level off at ``bound``, beyond the picture.
+    table (``table_miss``). Both level off at ``bound``, beyond the picture.
     """
     variance, slopes = np.empty(len(t)), np.zeros((len(t), len(x)))
     j = len(x) - 2
@@ -110,7 +116,7 @@ def variances(t, x, touch, speed, bound, power, steady):
     for i in range(len(t)):
         tau = min(t[i] - x[0], 0.0)
         by_hand = (hand * tau**power) ** 2
-        extra = by_hand + (speed * max(t[i] - touch, 0.0)) ** 2
+        extra = by_hand + table_miss(t[i] - touch, speed, softness) ** 2
         saturation = bound / (bound + extra)
         variance[i] = sigma + extra * saturation
         slopes[i, 0] = -2 * power * hand**2 * tau ** (2 * power - 1) * saturation**2
@@ -180,7 +186,7 @@ def frame_cost(squares, observed, i, variance, log_good, log_bad):
 
 
 @kept_on_disk()
-def touch_costs(squares, observed, variance, t, times, speed, bound, log_good, log_bad):
+def touch_costs(squares, observed, variance, t, times, speed, softness, bound, log_good, log_bad):
     """Return the cost of all clicks if the flight had ended at each of some times, (len(times),).
 
     ``squares`` (B, P) are squared misses of clicks, and ``variance`` (P,) is that of a coordinate without a table.
@@ -195,7 +201,7 @@ def touch_costs(squares, observed, variance, t, times, speed, bound, log_good, l
         first = np.searchsorted(t, times[j])
         cost[j] = cumulative[first]
         for i in range(first, frames):
-            extra = (speed * (t[i] - times[j])) ** 2
+            extra = table_miss(t[i] - times[j], speed, softness) ** 2
             cost[j] += frame_cost(
                 squares, observed, i, variance[i] + extra * bound / (bound + extra), log_good, log_bad
             )
