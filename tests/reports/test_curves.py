@@ -344,11 +344,14 @@ def test_columns_that_are_not_compared_are_named(tmp_path, capsys):
     assert cli.main(["compare", str(a), str(b), "--shift", "0"]) == 1
 
 
-@pytest.mark.parametrize(("text", "words"), [("t;x\n0,5;1\n", "semicolons"), ("t\tx\n0\t1\n", "tabs")])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("t;x\n0;1\n", "semicolons"), ("t;x\n0,5;1\n", "semicolons"), ("t\tx\n0\t1\n", "tabs")],
+)
 def test_other_separators_are_named(tmp_path, text, words):
     path = tmp_path / "a.csv"
     path.write_text(text)
-    with pytest.raises(ValueError, match=f"line 1 has {words}: separate columns by commas"):
+    with pytest.raises(ValueError, match=f"it has {words}: separate columns by commas"):
         read(path)
 
 

@@ -125,9 +125,11 @@ def read(path: Path | str, columns: Sequence[str] | None = None, time: str | Non
     if not path.is_file():
         raise ValueError(f"{path}: is no file")
     if path.suffix == ".csv":
-        from flipproof.output.tables import read_cells
+        from flipproof.output.tables import other_separator, read_cells
 
         names, rows = read_cells(path)
+        if hint := other_separator(names):
+            raise ValueError(f"{path}: {hint}")
         cells = list(zip(*(row for _, row in rows), strict=True)) or [()] * len(names)
         return curves(str(path), dict(zip(names, cells, strict=True)), columns, time)
     try:

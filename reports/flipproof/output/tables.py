@@ -123,6 +123,12 @@ SEPARATORS: Final = {";": "semicolons", "\t": "tabs"}
 """What other programs separate columns by."""
 
 
+def other_separator(names: list[str]) -> str:
+    """Return that columns are separated otherwise, if a header of one name says so; else nothing."""
+    found = next((name for mark, name in SEPARATORS.items() if len(names) == 1 and mark in names[0]), "")
+    return found and f"it has {found}: separate columns by commas, and write 0.5, not 0,5"
+
+
 def read_cells(path: Path) -> tuple[list[str], Rows]:
     """Return the names of a table's columns, and line number and cells of every row that is not blank.
 
@@ -139,17 +145,14 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
     if not numbered:
         raise ValueError(f"{path}: is empty")
     names = [name.strip() for name in _split(numbered[0][1])]
-    if len(names) == 1 and (other := next((name for mark, name in SEPARATORS.items() if mark in names[0]), "")):
-        raise ValueError(
-            f"{path}: line {numbered[0][0]} has {other}: separate columns by commas, and write 0.5, not 0,5"
-        )
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"{path}: line {numbered[0][0]} names the column {twice!r} twice")
     rows = [(n, _split(line)) for n, line in numbered[1:]]
     for n, cells in rows:
         if len(cells) != len(names):
-            raise ValueError(f"{path}: line {n} has {len(cells)} cells, the header has {len(names)}")
+            hint = f" ({other})" if (other := other_separator(names)) else ""
+            raise ValueError(f"{path}: line {n} has {len(cells)} cells, the header has {len(names)}{hint}")
     return names, rows
 
 
