@@ -246,6 +246,33 @@ def spring(stiffness=1e6, step=1e-5):
     return drop
 
 
+@pytest.mark.parametrize("dt", [1e-3, 4e-3])
+def test_an_engine_may_answer_at_few_times(dt):
+    """At the release, at impacts and at the end alone: nothing between two rows is taken for a stop in the air."""
+
+    def sparse(*asked):
+        t, y, v = located(*asked)
+        kept = np.concatenate([[True], (v[1:] > v[:-1]), [True]])[: len(t)]
+        kept[-1] = True
+        return t[kept], y[kept], v[kept]
+
+    made = passport(Adapter("sparse", sparse), dt)
+    assert {name for name in remarks_of(made) if name not in ("contract", "rest")} == set()
+
+
+def test_an_engine_without_gravity_has_no_drag():
+    weightless = changed(gravity=lambda _: 0.0)
+    remark = MEASURES["free fall"](Adapter("weightless", weightless), 1e-3).remark
+    assert "/s in flight" not in remark
+    assert "m/s^2 where 9.81 was asked" in remark
+
+
+def test_an_engine_whose_speeds_are_all_zero_is_measured():
+    made = passport(Adapter("still", answered(lambda t, y, v: (t, y, 0 * v))))
+    assert "v begins at 0 m/s" in made["contract"].remark
+    assert "it bounces until 0 s only" in made["rest"].remark
+
+
 def test_a_soft_contact_is_called_soft_and_no_matter_of_the_step():
     made = MEASURES["time of hit"](Adapter("spring", spring()), 1e-3)
     assert made.remark == "a contact takes 3.1 ms, also at a quarter of the step: it is soft"

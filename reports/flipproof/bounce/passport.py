@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any, Final
 
 import numpy as np
@@ -32,6 +33,12 @@ REMARKED_ERROR: Final = 5e-4
 
 REMARKED_HEIGHT: Final = 2e-4
 """Height of a resting body from which on it is remarked [m]."""
+
+LAG: Final = 0.75
+"""Steps by which v may lag behind the rate of y: half a step in methods of first order."""
+
+MIN_ROWS: Final = 8
+"""Fewest rows of a flight to which forces are fitted; an engine may answer at few times."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +132,7 @@ def contract(adapter: Adapter, dt: float) -> Measurement:
         remarks.append(f"v is not the rate of y: they differ by up to {rate_error:.2g} m/s")
     elif not apart <= LAG:
         remarks.append(f"v and y belong to times {apart + 0.5:.2g} steps apart")
-    same = all(np.array_equal(a, b) for a, b in zip(_flat(answers), _flat(repeats), strict=True))
+    same = all(np.array_equal(a, b) for a, b in zip(chain(*answers), chain(*repeats), strict=True))
     if not same:
         remarks.append("the same question gets another answer")
     sentence = f"v is the rate of y within {rate_error:.1e} m/s; the same question gets "
@@ -133,14 +140,6 @@ def contract(adapter: Adapter, dt: float) -> Measurement:
     return Measurement(
         "contract", sentence, "; ".join(remarks), {"deterministic": same, "largest_rate_error": rate_error}
     )
-
-
-LAG: Final = 0.75
-"""Steps by which v may lag behind the rate of y: half a step in methods of first order."""
-
-
-def _flat(answers: Sequence[tuple[FloatArray, ...]]) -> list[FloatArray]:
-    return [array for answer in answers for array in answer]
 
 
 def free_fall(adapter: Adapter, dt: float) -> Measurement:
@@ -161,7 +160,10 @@ def free_fall(adapter: Adapter, dt: float) -> Measurement:
                 text = f"without gravity y advances by {advance:.4g} of what v and t say at a step of {step * dt:g} s"
                 remarks.append(f"{text}: look at t, and at the step that is taken")
         errors[f"{gravity:g}"] = step_errors
-        curves[gravity] = np.polyfit(t, y, 3, cov=True)
+        if len(t) >= MIN_ROWS:
+            curves[gravity] = np.polyfit(t, y, 3, cov=True)
+        else:  # the rate of v alone
+            curves[gravity] = np.array([0.0, (v[-1] - v[0]) / (t[-1] - t[0]) / 2.0, 0.0, 0.0]), np.zeros((4, 4))
     if not remarks:
         remarks = _forces(curves, speed)
     worst = max(errors.values(), key=max)
@@ -181,8 +183,9 @@ def _forces(curves: Mapping[float, tuple[FloatArray, FloatArray]], speed: float)
     """
     remarks = []
     (y3, y2, *_), covariance = curves[GRAVITY]
-    drag = float(-3.0 * y3 / y2)
-    if abs(drag) > 1e-3 + 5 * 3.0 * math.sqrt(covariance[0, 0]) / abs(y2):
+    falls = -2.0 * y2 > 0.1 * GRAVITY  # else there is no fall to see a drag in
+    drag = float(-3.0 * y3 / y2) if falls else 0.0
+    if falls and abs(drag) > 1e-3 + 5 * 3.0 * math.sqrt(covariance[0, 0]) / abs(y2):
         remarks.append(f"speeds {'decay' if drag > 0.0 else 'grow'} by about {abs(drag):.1g} /s in flight")
     else:
         drag = 0.0
@@ -190,7 +193,7 @@ def _forces(curves: Mapping[float, tuple[FloatArray, FloatArray]], speed: float)
         measured = float(-2.0 * coefficients[1] - drag * speed)
         room = 1e-3 * max(gravity, 1.0) + 10 * math.sqrt(covariance[1, 1]) + 0.03 * abs(drag * speed)
         if not abs(measured - gravity) <= room:
-            remarks.append(f"gravity acts with {measured:.5g} m/s^2 where {gravity:g} was asked")
+            remarks.append(f"gravity acts with {round(measured, 6) + 0.0:.5g} m/s^2 where {gravity:g} was asked")
     return remarks
 
 
@@ -329,22 +332,23 @@ def _return_delays(adapter: Adapter, dt: float) -> tuple[float, float, FloatArra
 def energy(adapter: Adapter, dt: float) -> Measurement:
     """Ratio of the energies after and before twenty elastic bounces from one metre, at four steps."""
     duration = 20 * 2 * math.sqrt(2 / GRAVITY)
-    ratios, remark = [], ""
+    ratios, stop = [], ""
     for step in STEPS:
         t, y, v = adapter.drop(1.0, 0.0, 1.0, GRAVITY, step * dt, duration)
         ratios.append(float(y[-1] + v[-1] ** 2 / (2 * GRAVITY)))
-        moving = np.flatnonzero(y != y[-1])
-        if y[-1] > 0.02 and len(moving) and t[-1] - t[moving[-1]] > 0.1:
-            remark = f"it stops {y[-1]:.2g} m above the floor, {t[moving[-1]]:.3g} s after its release"
+        still = int(np.flatnonzero(np.append(-1.0, y) != y[-1])[-1])  # the row from which on y is the last one
+        if y[-1] > 0.02 and t[-1] - t[still] > 0.1:
+            stop = f"it stops {y[-1]:.2g} m above the floor, {t[still]:.3g} s after its release"
     low, high = min(ratios), max(ratios)
+    remarks = [stop] if stop else []
     if not max(abs(low - 1), abs(high - 1)) <= 0.01:
-        remark += "; " * bool(remark) + f"twenty elastic bounces leave {low:.4g} to {high:.4g} of the energy"
-        remark += " (negative: the body lies below the floor)" if low < 0.0 else ""
+        below = " (negative: the body lies below the floor)" if low < 0.0 else ""
+        remarks.append(f"twenty elastic bounces leave {low:.4g} to {high:.4g} of the energy{below}")
     return Measurement(
         "energy",
         f"twenty elastic bounces leave {low:.4f} to {high:.4f} of the energy, at steps from {STEPS[-1] * dt:g} to "
         f"{STEPS[0] * dt:g} s",
-        remark,
+        "; ".join(remarks),
         {"kept": ratios, "steps_s": [step * dt for step in STEPS]},
     )
 
@@ -361,20 +365,19 @@ def order(adapter: Adapter, dt: float) -> Measurement:
     slope = convergence(errors)
     t, y, _ = adapter.drop(0.5, 0.0, 0.7, WEAK, dt, 1.0)
     weak_error = float(abs(y[-1] - exact.dropped(0.5, 0.0, 0.7, WEAK, t)[0][-1]))
-    remark = ""
+    remarks = []
     if not weak_error <= 5.0 * errors[2] + 0.01:
-        remark = f"at {WEAK:g} m/s^2 an impact is {weak_error:.2g} m off half a second later; "
+        remarks.append(f"at {WEAK:g} m/s^2 an impact is {weak_error:.2g} m off half a second later")
     if not (slope >= 0.5 or errors[-1] <= 1e-5):
-        remark += f"across impacts the error does not fall with the step: {errors[0]:.1e} m at {STEPS[0] * dt:g} s, "
-        remark += f"{errors[-1]:.1e} m at {STEPS[-1] * dt:g} s"
+        remark = f"across impacts the error does not fall with the step: {errors[0]:.1e} m at {STEPS[0] * dt:g} s, "
+        remarks.append(f"{remark}{errors[-1]:.1e} m at {STEPS[-1] * dt:g} s")
         if max(errors) < 1.3 * min(errors):
-            remark += "; it is not the step's, but that of gravity, damping, the contact or the floor's place"
-    remark = remark.removesuffix("; ")
+            remarks.append("it is not the step's, but that of gravity, damping, the contact or the floor's place")
     return Measurement(
         "order",
         f"1.2 s of a fall from 1 m with e = 0.7 end {errors[2]:.1e} m off at a step of {dt:g} s ({_order_text(slope)} "
         "across impacts)",
-        remark,
+        "; ".join(remarks),
         {"errors_m": errors, "steps_s": [step * dt for step in STEPS], "order": slope},
     )
 
@@ -406,7 +409,7 @@ def rest(adapter: Adapter, dt: float) -> Measurement:
         remarks.append(f"half a second after its last exact impact it still moves, by up to {speed * 1e3:.2g} mm/s")
     t, y, v = adapter.drop(0.05, 0.0, 1.0, GRAVITY, dt, 12.0)  # sixty elastic bounces
     if not remarks and not np.abs(v[t > 11.5]).max() >= 0.1:
-        stopped = t[np.flatnonzero(np.abs(v) >= 0.1)[-1]]
+        stopped = t[np.abs(v) >= 0.1].max(initial=0.0)
         remarks.append(f"with e = 1 it bounces until {stopped:.2g} s only, from 0.05 m")
     _, y, _ = adapter.drop(0.2, 0.0, 0.0, GRAVITY, dt, 0.6)
     second_half = y[len(y) // 2 :]
