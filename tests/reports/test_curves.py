@@ -200,6 +200,15 @@ def test_many_jumps_are_all_matched():
     assert found.parted == 30000  # the last of A lies beyond the end of B
 
 
+def test_dense_jumps_with_a_twin_stay_in_memory():
+    """Without a bound on how late a jump may be, all belong together; equally many have one way to be matched."""
+    t = np.arange(24001.0)
+    base = of((t // 3) % 2, t)
+    assert len(compare(base, base, twins=[base], shift=10.0).events.pairs) == 8000
+    fewer = of(np.where(t < 23000, (t // 3) % 2, 0.0), t)
+    assert compare(base, fewer, twins=[fewer]).horizon == pytest.approx(23000, abs=5)
+
+
 def test_listed_events_are_the_jumps():
     t = np.linspace(0.0, 2.0, 201)
     runs = []
@@ -335,6 +344,21 @@ def test_files_of_any_columns_are_compared(tmp_path, capsys, suffix):
     capsys.readouterr()
     assert cli.main(["compare", str(a), str(tmp_path / f"missing{suffix}")]) == 2
     assert capsys.readouterr().err.endswith(f"missing{suffix} is no file\n")
+
+
+def test_throws_may_be_in_files_of_any_name_and_be_named_as_solvers(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.txt", "b.txt", "c.csv"):
+        (tmp_path / name).write_text("t,theta,omega\n0,0,20\n0.1,2,20\n")
+    (tmp_path / "d.dat").write_text("t,x\n0,0\n1,1\n")
+    assert cli.main(["compare", "a.txt", "b.txt"]) == 0
+    (tmp_path / "eq8").mkdir()
+    assert cli.main(["compare", "c.csv", "eq8"]) == 0
+    capsys.readouterr()
+    cli.main(["compare", "a.txt", "csv:c.csv"])
+    assert "is no file" not in capsys.readouterr().err
+    assert cli.main(["compare", "d.dat", "d.dat"]) == 2
+    assert "d.dat: the name must end in .csv" in capsys.readouterr().err
 
 
 def test_columns_that_are_not_compared_are_named(tmp_path, capsys):

@@ -171,17 +171,20 @@ def _compares_any_system(options: argparse.Namespace) -> bool:
             missing = next(path for path in paths if not path.is_file())
             raise ValueError(f"{missing} is no file: --columns, --twin, --from-twins, --shift and --plot compare files")
         for path in paths:
-            if (path.suffix in SUFFIXES or path.is_dir()) and not path.is_file():
+            if (
+                path.suffix in SUFFIXES and ":" not in str(path) and not path.is_file()
+            ):  # nor a solver, such as csv:FILE
                 raise ValueError(f"{path} is no file")
         return False
-    for path in paths:
-        if path.suffix not in SUFFIXES:
-            raise ValueError(f"{path}: the name must end in {', '.join(SUFFIXES)}")
     if for_files or any(path.suffix in (".parquet", ".npz", ".nc") for path in paths):
         return True
     from flipproof.output.tables import QUANTITIES, read_cells
 
-    return all(path.suffix == ".csv" and not {*QUANTITIES} & {*read_cells(path)[0]} for path in paths)
+    if any({*QUANTITIES} & {*read_cells(path)[0]} for path in paths):
+        return False
+    if other := next((path for path in paths if path.suffix not in SUFFIXES), None):
+        raise ValueError(f"{other}: the name must end in {', '.join(SUFFIXES)}")
+    return True
 
 
 def _compare_curves(options: argparse.Namespace) -> int:

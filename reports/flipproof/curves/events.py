@@ -19,6 +19,8 @@ def closest(first: FloatArray, second: FloatArray, in_first: IndexArray, in_seco
     """Match as many as possible in order, with the smallest sum of shifts; return indices, shape (2, K)."""
     if len(in_first) > len(in_second):
         return closest(second, first, in_second, in_first)[::-1]
+    if len(in_first) == len(in_second):
+        return np.stack([in_first, in_second])  # there is one way
     shift = np.abs(second[in_second][np.newaxis, :] - first[in_first][:, np.newaxis])
     # best[i, j]: smallest sum for the first i of in_first among the first j of in_second
     best = np.full((len(in_first) + 1, len(in_second) + 1), np.inf)
@@ -33,6 +35,10 @@ def closest(first: FloatArray, second: FloatArray, in_first: IndexArray, in_seco
         j -= 1
         chosen.append(j)
     return np.stack([in_first, in_second[chosen[::-1]]])
+
+
+MAX_EVENTS: Final = 2000
+"""Number of jumps of either run that are matched by their shifts; of more that may all belong together, the first."""
 
 
 class Jumps(NamedTuple):
@@ -147,11 +153,13 @@ def match(first: Jumps, second: Jumps, shift: FloatArray) -> tuple[Matched, Inde
     times, run = np.concatenate([first.time, second.time]), np.repeat([0, 1], [len(first.time), len(second.time)])
     order = np.argsort(times, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(times[order]) > reach) + 1)
-    pairs = [
-        closest(first.time, second.time, group[run[group] == 0], group[run[group] == 1] - len(first.time))
-        for group in groups
-        if len(np.unique(run[group])) == 2
-    ]
+    pairs = []
+    for group in groups:
+        in_first, in_second = group[run[group] == 0], group[run[group] == 1] - len(first.time)
+        if len(in_first) != len(in_second):
+            in_first, in_second = in_first[:MAX_EVENTS], in_second[:MAX_EVENTS]
+        if len(in_first) and len(in_second):
+            pairs.append(closest(first.time, second.time, in_first, in_second))
     j, k = np.concatenate(pairs, axis=1) if pairs else np.zeros((2, 0), np.int64)
     slack = np.finfo(float).eps * 64 * np.abs(np.concatenate([first.time, second.time, [0.0]])).max()
     widths = first.width[j], second.width[k]
