@@ -27,8 +27,7 @@ def film(
     rng: np.random.Generator, *, fps: float = 240.0, noise: float = 1e-3, tilt: float = 0.0, filling: float = 0.5,
     bad: int = 0, missing: int = 0, gamma: float = 6.0, e: float = 0.4, omega0: float = 18.0, slices: int = 20,
     duration: float = 0.5, model: str = "free-flight", theta0: float | None = None, hand: float = 0.3,
-    swings: bool = False, flick: float = 0.0,
-    softness: float = 0.0,
+    swings: bool = False, flick: float = 0.0, softness: float = 0.0,
 ) -> Clip:  # fmt: skip
     """Return a clip; ``tilt`` in degrees, ``bad`` clicks and ``missing`` points fall on frames in flight.
 
