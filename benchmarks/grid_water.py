@@ -29,8 +29,8 @@ own place: momentum ``b`` and angular momentum ``spin``, for a unit of mass. The
 ``spin`` as a rotation of the water in the particle's cell. So angular momentum is mended nowhere, and ``drift`` is
 rounding, 1e-14.
 
-Accuracy: from 16 to 32 cells the plateaus of the paper's throw move by up to 0.015 omega_0 (0.06 at a filling of 0.1).
-J''(0) with suction has an error of first order in the cells, 12 % with 16. Energy rises by 0.4 % at most, where a gap
+Accuracy: from 16 to 32 cells the plateaus of the paper's throw move by up to 0.016 omega_0 (0.06 at a filling of 0.1).
+J''(0) with suction has an error of first order in the cells, 12 % with 16. Energy rises by 0.7 % at most, where a gap
 closes. A full bottle should turn on unchanged; with 16 cells omega is off by 1e-5 of omega_0, of second order in the
 step, and by 1.1e-2 if its water starts without vorticity (``benchmarks/ideal_water.py --verify``).
 

@@ -86,6 +86,7 @@ def page_of(path: Path, current: str, *, report: bool, lesson: bool) -> str:
     text = re.sub(
         r"\]\((?:docs/)?([\w-]+)\.md(#[\w-]+)?\)", lambda match: f"]({match.group(1)}.html{match.group(2) or ''})", text
     )
+    text = re.sub(r"^```(\w+) file=.*$", r"```\1", text, flags=re.MULTILINE)  # which markdown2 takes for no block
     body = str(markdown2.markdown(text, extras=["tables", "fenced-code-blocks", "header-ids"]))
     body = re.sub(r"<pre><code>(.*?)</code></pre>", lambda match: _block(match.group(1)), body, flags=re.DOTALL)
     return site_page(PAGES[current], body, current, report=report, lesson=lesson)
