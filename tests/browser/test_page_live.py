@@ -212,6 +212,40 @@ def test_a_throw_backwards_has_the_numbers_of_its_mirror_image(changed):
     assert "Eq. 8 0 %" not in said[1][0]
 
 
+def test_a_flight_that_rounding_decides_is_said_to_be_uncertain(visit):
+    """A full bottle without drag, whose slices strike both ends at one instant: its twins are other flights."""
+    with visit(at="index.html#live?fill=1&gamma=0&e=0.8") as visited:
+        said = visited.page.get_by_test_id("live-said")
+        visited.page.wait_for_function(
+            "() => document.querySelector('[data-testid=live-said]').textContent.includes('uncertain by about')"
+        )
+        assert 1.0 < float(said.inner_text().split("uncertain by about ")[1].split(" %")[0]) < 30.0
+        visited.page.get_by_test_id("live-reset").click()
+        visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown.gamma > 0")
+        visited.page.wait_for_timeout(1500)
+        assert "uncertain" not in said.inner_text()
+
+
+def test_an_address_beyond_a_slider_is_that_of_its_end(visit):
+    with visit(at="index.html#live?gamma=99&e=1.5&fill=3") as visited:
+        visited.page.wait_for_function("() => window.flipproofSliders.drawn().thrown?.gamma > 5")
+        drawn = visited.page.evaluate("() => window.flipproofSliders.drawn().thrown")
+        assert (drawn["gamma"], drawn["e"], drawn["fill"]) == (20.0, 0.8, 1.0)
+
+
+def test_another_spin_changes_the_spin_as_a_share_of_its_own_start(visit):
+    """Not by the step that the slider itself makes at the release."""
+    with visit() as visited:
+        scene = visited.page.locator("#scene-outward")
+        scene.scroll_into_view_if_needed()
+        visited.settle()
+        scene.locator("input").focus()
+        visited.page.keyboard.press("Home")
+        visited.settle()
+        assert 0.01 < float(scene.get_attribute("data-moved")) < 1.0
+        assert "ω/ω₀ moves by up to" in scene.locator(".proof").inner_text()
+
+
 def test_a_throw_without_gravity_is_given_some(changed):
     with changed(g=0.0) as visited:
         visited.page.get_by_test_id("gravity").click()

@@ -97,6 +97,34 @@ def test_a_finding_must_stay_where_the_baseline_has_it_and_in_the_interval_chose
     assert [case.get("name") for case in suite if case.find("failure") is not None] == ([STEP] if failed else [])
 
 
+@pytest.mark.usefixtures("computed")
+def test_what_a_baseline_does_not_know_is_said(place, capsys):
+    folder = place(STEP, value=None)
+    summary = json.loads((folder / "summary.json").read_text())
+    gone = summary["findings"].pop(0)["id"]
+    (folder / "summary.json").write_text(json.dumps(summary))
+    assert flipproof("check", folder / "throw.toml", "--baseline", folder, "--only", "thresholds") == 0
+    lines = capsys.readouterr().out.splitlines()
+    (words,) = (line for line in lines if line.startswith(f"PASS  {STEP}:"))
+    assert words.endswith("baseline not evaluated")
+    assert lines[-1] == f"not in the baseline, and not checked: {gone}"
+
+
+@pytest.mark.usefixtures("computed")
+def test_a_finding_that_moved_a_little_is_shown_with_the_digits_that_tell_it(place, capsys, thresholds):
+    (value,) = (finding.value for finding in thresholds if finding.id == STEP)
+    folder = place(STEP, value=value * (1 + 1e-4))
+    chosen = ("--baseline", folder, "--only", "thresholds", "--junit", folder / "junit.xml", "--tolerance", "0")
+    assert flipproof("check", folder / "throw.toml", *chosen) == 1
+    assert "moved by -" in capsys.readouterr().out
+    (suite,) = ElementTree.parse(folder / "junit.xml").getroot()
+    (message,) = (case.find("failure").get("message") for case in suite if case.find("failure") is not None)
+    numbers, _, rest = message.partition("; ")
+    shown, low = float(numbers.split()[0]), float(numbers.partition("threshold ")[2].split()[0])
+    assert shown < low
+    assert rest.startswith("baseline ")
+
+
 def test_without_a_baseline_ice_vectors_convergence_and_reference_are_checked(place, capsys):
     folder = place()
     assert flipproof("check", folder / "throw.toml") == 0

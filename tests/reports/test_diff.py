@@ -311,7 +311,18 @@ def test_a_missing_folder_and_a_repeated_id_are_refused(tmp_path, sound):
         read_summary(written(tmp_path / "report", twice))
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"kind": "regression"}, "observation → regression"),
+        ({"admissible": [None, 1e-5]}, "threshold none → ≤ 1e-05"),
+    ],
+)
+def test_another_kind_or_threshold_is_a_difference(changes, words):
+    assert change_of(finding(), {**finding(), **changes}) == Change(kind="words", id="x", words=words)
+
+
 def test_a_change_is_worded_with_its_size_and_its_band():
     assert change_of(finding(), finding(value=1.5)) == Change(
-        kind="moved", id="x", words="1 m → 1.5 m, moved by +0.5, bands allow 0.2"
+        kind="moved", id="x", words="1 m → 1.5 m, moved by +0.5, bands and tolerance allow 0.2"
     )

@@ -137,10 +137,10 @@ def test_a_finished_map_is_only_drawn_again(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(None))
     status, out, err = run(capsys, *options, "--export", tmp_path / "out" / "rows.csv")
     assert (status, err) == (0, "")
-    assert "; 170 were there" in out
+    assert "; 206 were there" in out
     assert (tmp_path / "out" / "map.svg").read_bytes() == drawn
     assert (tmp_path / "out" / "map.png").read_bytes().startswith(b"\x89PNG")
-    assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 171
+    assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 207
 
 
 def test_table_and_contours_say_what_the_map_holds(tmp_path):
@@ -157,8 +157,9 @@ def test_table_and_contours_say_what_the_map_holds(tmp_path):
         assert row["largest fair share"] == ("" if study.dominant[at] < 0 else RUNGS[study.dominant[at]])
         assert row["reason"] == ""
     facts = json.loads(json.dumps(map_facts(study, THROW), allow_nan=False))
-    assert sum(facts["cells by largest fair share"].values()) + facts["cells below 0.0001"] == 9
-    assert facts["cells below 0.0001"] == int((np.abs(study.shares).max(axis=0) < 1e-4).sum()) > 0
+    assert sum(facts["cells by largest fair share"].values()) + facts["cells undecided"] == 9
+    *_, second, first = np.sort(np.abs(study.shares), axis=0)
+    assert facts["cells undecided"] == int(((first < 1e-4) | (first - second < study.band)).sum()) > 0
     assert [(contour["of"], contour["level"]) for contour in facts["contours"]] == [
         (of, level) for of in ("error of published-python", "change by overlap") for level in (0.01, 0.1)
     ]

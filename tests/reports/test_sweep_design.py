@@ -161,9 +161,11 @@ def test_a_latin_hypercube_reaches_every_kind_of_field():
         ("from = 0.2", 'scale = "log", from = 0', ["from = 0.0 is outside (0, inf)"]),
         ("count = 3", "count = 900000", ["1800000 throws by 2 solvers make 3600000 points, more than 1000000"]),
         ('name = "eq8"', 'name = "eq9"', ["[[solvers]] 2: solver 'eq9' is unknown", "'eq8'?"]),
-        ('name = "eq8"', "rtol = 1e-9", ["[[solvers]] 2 name = None is not a solver's name"]),
+        ('name = "eq8"', "rtol = 1e-9", ["[[solvers]] 2 lacks a name"]),
         ('name = "eq8"', 'name = "eq8"\nrtoll = 1.0', ["2 (eq8) key 'rtoll' is unknown", "'rtol'?"]),
         ('name = "eq8"', 'name = "eq8"\nsteps = 5', ["2 (eq8) key 'steps' is unknown"]),
+        ('name = "eq8"', 'name = "eq8"\ntimes = [0.0, 0.1]', ["2 (eq8) times belongs to one throw", "curves = 101"]),
+        ('name = "eq8"', 'name = "eq8"\nspeeds = [1.0]', ["2 (eq8) speeds belongs to one throw"]),
         ('name = "eq8"', 'name = "eq8"\nrtol = inf', ["rtol = inf is not a finite number"]),
         ('name = "eq8"', 'name = "exact-step"\nsteps = 50', ["2 (exact-step) is there twice"]),
     ],
@@ -186,7 +188,7 @@ def test_every_mistake_names_file_table_key_and_value(old, new, words):
         ('[sweep]\ndesign = "grid"\n[sweep.fields]', "[sweep.fields] is empty"),
         (GRID.partition("[[solvers]]")[0], "has no [[solvers]]"),
         (GRID.partition("[[solvers]]")[0] + '[solvers]\nname = "eq8"', "has no [[solvers]]"),
-        (LATIN.replace("samples = 50", ""), "samples = None is not a whole number in [1, 1000000]"),
+        (LATIN.replace("samples = 50", ""), "[sweep] lacks samples"),
         (LATIN.replace("seed = 3", "seed = -3"), "seed = -3 is not a whole number"),
         (LATIN.replace("{from = 0.1, to = 0.9}", "[0.1]").replace("drag", "#"), "its throws would repeat themselves"),
     ],
@@ -220,11 +222,15 @@ def test_a_setting_out_of_range_is_refused_before_the_first_point(settings, word
 
 
 def test_settings_in_range_are_tried_without_their_cost():
-    try_entries(
-        read(
-            GRID.replace("steps = 50", "steps = 1000000000") + 'times = [0.0, 0.5]\nmethod = "DOP853"\nmax_step = 0.01'
-        ).entries
-    )
+    try_entries(read(GRID.replace("steps = 50", "steps = 1000000000") + 'method = "DOP853"\nmax_step = 0.01').entries)
+
+
+def test_a_base_throw_may_need_the_capacity_that_is_swept():
+    text = GRID.replace("fill_fraction", "bottle.capacity").replace("[0.25, 0.5]", "[10.0, 20.0]")
+    throws = list(read(text + "[scenario]\nwater_mass = 5.0\n").points())
+    assert {(point.throw["scenario"]["water_mass"], point.throw["bottle"]["capacity"]) for point in throws} == {
+        (5.0, 10.0), (5.0, 20.0),
+    }  # fmt: skip
 
 
 def test_a_sweep_may_be_as_large_as_stated_and_costs_nothing_to_state():

@@ -4,8 +4,8 @@
 
 A finding that moved further and states no band in either report is not comparable: a residual, a ratio of growth or a
 cost may be another on another machine, and nothing says by how much. It is told and not counted as a difference; its
-verdict, its unit and its title are compared all the same. Notes and run times are not compared: they hold the clock of
-the machine. Titles are, for a certificate or an erratum states its verdict there.
+verdict, unit, title, kind and threshold are compared all the same. Notes and run times are not compared: they hold the
+clock of the machine. Titles are, for a certificate or an erratum states its verdict there.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from flipproof.frame.findings import interval_text
 from slicemodel.scenario import UnsuitableFileError, read_text
 
 ROUND_OFF: Final = 1e-9
@@ -148,6 +149,8 @@ def _problem(summary: Any) -> str:
         bounds = finding["admissible"]
         if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(_readable, bounds))):
             return f"finding {finding['id']!r}: admissible = {bounds!r} is not two numbers or nulls"
+        if None not in bounds and not float(bounds[0]) <= float(bounds[1]):
+            return f"finding {finding['id']!r}: admissible = {bounds!r}, the first must not exceed the second"
     ids = [finding["id"] for finding in findings]
     twice = sorted(name for name, count in Counter(ids).items() if count > 1)
     return f"findings share the id {twice[0]!r}" if twice else ""
@@ -196,10 +199,16 @@ def change_of(old: Mapping[str, Any], new: Mapping[str, Any], tolerance: float =
         return Change(kind="moved", id=name, words=f"{_value(old)} → {_value(new)}")
     moved = first is not None and second is not None and not within(first, second, bands(old, new) + tolerance)
     if moved and (_bands(old, new) or not (math.isfinite(first or 0.0) and math.isfinite(second or 0.0))):
-        return Change(kind="moved", id=name, words=_moved(old, new))
+        return Change(kind="moved", id=name, words=_moved(old, new, tolerance))
     if old["title"] != new["title"]:
         return Change(kind="words", id=name, words=f"“{old['title']}” → “{new['title']}”")
-    return Change(kind="bandless", id=name, words=_moved(old, new)) if moved else None
+    if old["kind"] != new["kind"]:
+        return Change(kind="words", id=name, words=f"{old['kind']} → {new['kind']}")
+    thresholds = interval(old), interval(new)
+    if not all(within(one, other, 1e-6 * abs(one)) for one, other in zip(*thresholds, strict=True)):
+        before, after = (interval_text(threshold, None, digits=6) for threshold in thresholds)
+        return Change(kind="words", id=name, words=f"threshold {before} → {after}")
+    return Change(kind="bandless", id=name, words=_moved(old, new, tolerance)) if moved else None
 
 
 def _bands(*findings: Mapping[str, Any]) -> list[float]:
@@ -220,10 +229,23 @@ def within(old: float, new: float, allowed: float) -> bool:
     return abs(new - old) <= allowed + ROUND_OFF * max(abs(old), abs(new)) + MIN_CHANGE
 
 
-def _moved(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    by = float(new["value"]) - float(old["value"])
-    words = f"{_value(old)} → {_value(new)}, moved by {by:+.2g}"
-    return words + (f", bands allow {bands(old, new):.1g}" if _bands(old, new) else ", no band")
+def interval(finding: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the ends of the interval that a finding of a summary must lie in; without a bound they are infinite."""
+    low, high = map(number, finding["admissible"])
+    return -math.inf if low is None else low, math.inf if high is None else high
+
+
+def moved_words(old: float, new: float, allowed: float) -> str:
+    """Return by how much a number moved, and what its bands and the tolerance allow."""
+    return f"moved by {new - old:+.3g}, bands and tolerance allow {allowed:.3g}"
+
+
+def _moved(old: Mapping[str, Any], new: Mapping[str, Any], tolerance: float) -> str:
+    words = f"{_value(old)} → {_value(new)}"
+    before, after = float(old["value"]), float(new["value"])
+    if not _bands(old, new):
+        return f"{words}, moved by {after - before:+.3g}, no band"
+    return f"{words}, {moved_words(before, after, bands(old, new) + tolerance)}"
 
 
 def _value(finding: Mapping[str, Any]) -> str:

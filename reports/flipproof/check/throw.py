@@ -6,9 +6,10 @@ stay where the baseline has it,
 
     |value - baseline| <= 2 band + tolerance + round-off
 
-with the baseline's band for either side, and inside the interval ``admissible`` that the baseline gives it: a project
-chooses a threshold by writing it there. Of the other groups' claims only the interval is held to the baseline, since
-their values are round-off, which differs between machines. What is not computed again is said, not passed over.
+and inside the interval ``admissible`` that the baseline gives it: a project chooses a threshold by writing it there.
+The band is the baseline's, for either side, since no twins are flown here. Of the other groups' claims only the
+interval is held to the baseline, since their values are round-off, which differs between machines. What is not
+computed again, or is not in the baseline, is said, not passed over.
 """
 
 from __future__ import annotations
@@ -24,7 +25,17 @@ from typing import Any, Final
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named, parts
 from flipproof.chapters.solvers import Guest, invited
-from flipproof.check.diff import MIN_CHANGE, ROUND_OFF, TOLERANCE, bands, number, read_summary, scenario_changes
+from flipproof.check.diff import (
+    MIN_CHANGE,
+    ROUND_OFF,
+    TOLERANCE,
+    bands,
+    interval,
+    moved_words,
+    number,
+    read_summary,
+    scenario_changes,
+)
 from flipproof.frame.findings import Finding, interval_text
 from flipproof.frame.gather import evaluate, gather
 from flipproof.frame.pool import SerialExecutor
@@ -37,11 +48,13 @@ class Checked:
     """The claims that were checked, and the baseline's findings that were not.
 
     ``seconds`` are the wall times that the claims took [s], by their ids; the first of a group has that of its runs.
-    ``own`` counts the claims that are tried on flipproof's own throws, or on the paper's formulas.
+    ``own`` counts the claims that are tried on flipproof's own throws, or on the paper's formulas; ``unknown`` are
+    findings that the baseline does not have.
     """
 
     findings: tuple[Finding, ...]
     left_out: tuple[str, ...]
+    unknown: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     own: int = 0
 
@@ -62,6 +75,8 @@ class Checked:
             groups = Counter(name.partition("-")[0] for name in self.left_out)
             listed = ", ".join(f"{group} {count}" for group, count in sorted(groups.items()))
             words += f"\nnot recomputed: {len(self.left_out)} findings of the baseline ({listed})"
+        if self.unknown:
+            words += f"\nnot in the baseline, and not checked: {', '.join(self.unknown)}"
         return words
 
 
@@ -99,6 +114,7 @@ def check(
         raise ValueError(f"{baseline}: slices = {slices!r} must be a whole number of at least 1")
     throw = scenario.with_slices(slices)
     findings: list[Finding] = []
+    unknown: list[str] = []
     seconds: dict[str, float] = {}
     tasks: list[tuple[str, tuple[Guest, ...]]] = [(group, ()) for group in groups]
     tasks += [("guests", invited(guests, timeout))] if guests else []
@@ -108,17 +124,20 @@ def check(
             began, seconds[finding.id] = time.perf_counter(), time.perf_counter() - began
             was = old_findings.get(finding.id)
             moves = group == "thresholds" or (group == "guests" and finding.kind != "regression")
-            if moves and (was is None or (group == "guests" and was["value"] is None)):
+            if moves and was is None:
+                unknown.append(finding.id)
+                continue
+            if was is not None and group == "guests" and moves and was["value"] is None:
                 continue
             held, needs = finding, _threshold(finding.admissible, finding.value)
             if was is not None:
                 held, needs = _held_to(finding, was, tolerance, moves=moves)
-            findings.append(held)
+            findings.append(held if was is None else replace(held, note="; ".join(filter(None, (needs, held.note)))))
             own += group in OWN_THROWS or finding.id.startswith("erratum-")
             say(line(held, needs))
     recomputed = {finding.id for finding in findings}
     left_out = tuple(name for name in old_findings if name not in recomputed) if "thresholds" in groups else ()
-    return Checked(findings=tuple(findings), left_out=left_out, seconds=seconds, own=own)
+    return Checked(findings=tuple(findings), left_out=left_out, unknown=tuple(unknown), seconds=seconds, own=own)
 
 
 def line(finding: Finding, needs: str) -> str:
@@ -145,15 +164,17 @@ def _held_to(finding: Finding, was: Mapping[str, Any], tolerance: float, *, move
     if finding.value is not None and finding.unit != was["unit"]:
         words = f"baseline in another unit: {was['unit']!r}"
         return replace(finding, kind="regression", admissible=(math.nan, math.nan)), words
-    bounds = [number(bound) for bound in was["admissible"]]
-    low, high = (bound if bound is not None else math.copysign(math.inf, k - 0.5) for k, bound in enumerate(bounds))
+    low, high = interval(was)
     chosen = not (math.isinf(low) and math.isinf(high))
     needs = [_threshold((low, high), finding.value)] if chosen else []
     value = number(was["value"])
-    if moves and value is not None and math.isfinite(value):
-        allowed = 2.0 * bands(was) + tolerance + ROUND_OFF * abs(value) + MIN_CHANGE
-        low, high = max(low, value - allowed), min(high, value + allowed)
-        needs.insert(0, f"baseline {value:.6g} ± {allowed:.1g}")
+    if moves and finding.value is not None:
+        if value is None or not math.isfinite(value):
+            needs.insert(0, "baseline not evaluated")
+        else:
+            allowed = 2.0 * bands(was) + tolerance + ROUND_OFF * abs(value) + MIN_CHANGE
+            low, high = max(low, value - allowed), min(high, value + allowed)
+            needs.insert(0, f"baseline {value:.6g}, {moved_words(value, finding.value, allowed)}")
     return replace(finding, kind="regression", admissible=(low, high)), " and ".join(needs) or "any number"
 
 

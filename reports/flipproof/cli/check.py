@@ -46,7 +46,7 @@ def add_checks(commands: Any) -> None:
     check.add_argument("scenario", metavar="SCENARIO.toml", help="scenario file (TOML with [scenario] and [bottle])")
     check.add_argument(
         "--baseline", type=Path, metavar="SUMMARY", help="summary.json of a report of this throw, or its folder: "
-        "findings are compared with it, and held to the thresholds that stand in it",
+        "its differences and errata must not move, and what is checked is held to the thresholds that stand in it",
     )  # fmt: skip
     check.add_argument("--tolerance", type=tolerance, metavar="X", help=TOLERANCE_HELP)
     check.add_argument(

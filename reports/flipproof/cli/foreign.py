@@ -170,7 +170,7 @@ def command_place(options: argparse.Namespace) -> int:
 
 
 def command_explain(options: argparse.Namespace) -> int:
-    """Print why two solvers differ; return 1 if one of them is off the lattice."""
+    """Print why two solvers differ; return 1 if one is off the lattice, or flies this throw otherwise."""
     from flipproof.foreign.place import explain
     from flipproof.foreign.solving import opened
 
@@ -178,4 +178,4 @@ def command_explain(options: argparse.Namespace) -> int:
     with closing(opened(options.first)) as first, closing(opened(options.second)) as second:
         found = explain(first, second, throw)
     print(inert(found.text))
-    return 0 if found.first.on_lattice and found.second.on_lattice else 1
+    return 0 if found.fits else 1

@@ -26,7 +26,7 @@ from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits
 from flipproof.frame import shapley
 from flipproof.frame.equations import NAMES, canonical
 from flipproof.frame.solvers import Run, make, solve
-from flipproof.frame.twins import BAND_WORDS, band, twins
+from flipproof.frame.twins import BAND_WORDS, band, omega_band, twins
 from ode_reference.models import MODELS
 from ode_reference.switches import Switches, are_switches
 from slicemodel import Scenario
@@ -103,7 +103,7 @@ class Place:
                 "bottle; no equation of the ladder gives that"
             )
         own = "it cannot be refined" if self.change is None else f"its own change under refinement is {self.change:.2g}"
-        nearest = f"{self.equation} at {self.distance:.2g} of omega_0 ({own})"
+        nearest = f"{self.equation} at {self.distance:.2g} of omega_0 in three short throws ({own})"
         following = f"the next different equation is {self.following} at {self.following_distance:.2g}"
         inert = f"; without effect there: {', '.join(self.inert)}" if self.inert else ""
         if self.on_lattice:
@@ -118,10 +118,15 @@ class Place:
     @property
     def advice(self) -> str:
         """What to do, if nothing but the place is known; else empty."""
-        lost = not (self.still or self.on_lattice)
-        return (
-            "look for another restitution, drag, mass or gravity than the throw's, or for other physics" if lost else ""
-        )
+        if self.still or self.on_lattice:
+            return ""
+        coarse = "take shorter steps or declare refined_by; if that changes nothing, " if self.change is None else ""
+        return f"{coarse}look for another restitution, drag, mass or gravity than the throw's, or for other physics"
+
+    @property
+    def clear(self) -> bool:
+        """True if the nearest equation is at most half as far as the next."""
+        return not self.still and self.distance <= self.following_distance / 2
 
     def to_mapping(self) -> dict[str, object]:
         """Return the place as JSON-ready data."""
@@ -244,6 +249,8 @@ class Explanation:
     ``first`` and ``second`` are the places of the two; ``values`` their plateaus; ``bars`` maps a switch to its share
     of ``difference``; ``rest`` is what no switch explains. Bars and rest sum to the difference. ``band`` is the largest
     numerical uncertainty of the plateau of an equation from which the bars follow (``frame.twins``), NaN if not known.
+    ``misfits`` are, for each solver, the largest difference of omega(t) from its equation in this throw, fraction of
+    omega_0, and the part of it that its own error explains.
     """
 
     first: Place
@@ -253,6 +260,12 @@ class Explanation:
     rest: float
     band: float
     slices: int
+    misfits: tuple[tuple[float, float], tuple[float, float]]
+
+    @property
+    def fits(self) -> bool:
+        """True if both solvers are on the lattice, and fly this throw, too, as their equations do."""
+        return self.first.on_lattice and self.second.on_lattice and all(misfit <= room for misfit, room in self.misfits)
 
     @property
     def difference(self) -> float:
@@ -273,23 +286,33 @@ class Explanation:
             f"{self.difference:+.{digits}f}",
         ]
         if digits < EXACT:
-            known = f"at most {self.band:.1g}" if self.band > 0.0 else "not known"
+            known = f"{self.band:.1g}" if self.band > 0.0 else "not known"
             lines.append(f"numerical uncertainty of the mean of an equation: {known} ({BAND_WORDS})")
+        for one, (misfit, room) in zip((first, second), self.misfits, strict=True):
+            if one.on_lattice and not misfit <= room:
+                lines.append(
+                    f"in this throw {one.solver} departs from {one.equation} by up to {misfit:.2g} of omega_0, more "
+                    f"than its own error explains ({room:.2g}): look for a value of the throw that it does not take"
+                )
         if self.bars:
             lines.append("of the difference, on average over all orders in which these assumptions can be changed:")
         for name, share in self.bars.items():
-            part = f" ({share / self.difference:.{percents}%} of it)" if size > 1e-9 and self.band < size else ""
+            told = self.band < size and size > max(map(abs, self.bars.values())) / 20
+            part = f" ({share / self.difference + 0.0:.{percents}%} of it)" if told else ""
             lines.append(f"  {share:+.{digits}f}  {NAMES[name]}{part}")
         lost = [one.solver for one in (first, second) if not one.on_lattice]
-        rest = (
-            f"what these do not explain; {' and '.join(lost)} {'solve' if lost[1:] else 'solves'} no equation of the "
-            "ladder, so that the shares are those of the nearest one"
-            if lost
-            else "the rest: what no assumption explains, such as steps and errors of the two solvers"
-        )
+        rest = "the rest: what no assumption explains, such as steps and errors of the two solvers"
+        if lost:
+            words = f"{' and '.join(lost)} {'are' if lost[1:] else 'is'} off the lattice"
+            unclear = [one for one in (first, second) if not (one.on_lattice or one.clear)]
+            rest = (
+                f"the whole difference: {words}, and no equation is clearly the nearest, so that there are no shares"
+                if unclear
+                else f"what the shares do not explain: {words}, and the shares are those of the nearest equation"
+            )
         lines.append(f"  {round(self.rest, digits) + 0.0:+.{digits}f}  {rest}")
-        if self.bars and set(first.inert) & set(second.inert):
-            still = " and ".join(NAMES[name] for name in sorted(set(first.inert) & set(second.inert)))
+        if self.bars and (same := (set(first.inert) & set(second.inert)) - set(self.bars)):
+            still = " and ".join(NAMES[name] for name in sorted(same))
             lines.append(
                 f"without effect in both equations, and not changed here: {still} (a waterfall changes it, too)"
             )
@@ -308,13 +331,12 @@ def explain(first_runner: Runner, second_runner: Runner, throw: Scenario) -> Exp
 
     Raises ForeignError if one of them gives no answer, ValueError if an equation between them gives none.
     """
-    first, second = place(first_runner), place(second_runner)
-    a, b = (runner(ask_of(runner.traits, throw, 3, 1000)) for runner in (first_runner, second_runner))
-    values = plateau(a.t, a.omega, throw.omega0), plateau(b.t, b.omega, throw.omega0)
-    # A switch without effect in one equation is set as in the other.
-    start = replace(first.switches, **{name: getattr(second.switches, name) for name in first.inert})
-    end = replace(second.switches, **{name: getattr(start, name) for name in second.inert})
-    bars, band = shares(start, end, throw)
+    first, first_level, first_misfit = _flown(first_runner, throw)
+    second, second_level, second_misfit = _flown(second_runner, throw)
+    values = first_level, second_level
+    start, end = ends_of(first, second)
+    clear = all(one.on_lattice or one.clear for one in (first, second))
+    bars, band = shares(start, end, throw) if clear else ({}, 0.0)
     return Explanation(
         first=first,
         second=second,
@@ -323,7 +345,46 @@ def explain(first_runner: Runner, second_runner: Runner, throw: Scenario) -> Exp
         rest=values[1] - values[0] - sum(bars.values()),
         band=band,
         slices=throw.n_slices,
+        misfits=(first_misfit, second_misfit),
     )
+
+
+def ends_of(first: Place, second: Place) -> tuple[Switches, Switches]:
+    """Return the switches between which a difference is split.
+
+    An equation with a name on the ladder has that rung's; in another, a switch without effect is set as in the other
+    equation.
+    """
+    rungs = [MODELS[one.equation].switches if one.equation in MODELS else None for one in (first, second)]
+    start = rungs[0] or replace(first.switches, **{n: getattr(rungs[1] or second.switches, n) for n in first.inert})
+    end = rungs[1] or replace(second.switches, **{n: getattr(start, n) for n in second.inert})
+    return start, end
+
+
+def _flown(runner: Runner, throw: Scenario) -> tuple[Place, float, tuple[float, float]]:
+    """Return a solver's place and its plateau in a throw; and its misfit there, with the part that its error explains.
+
+    Raises ForeignError, naming the solver, if it gives no answer.
+    """
+    try:
+        placed = place(runner)
+        answer = runner(ask_of(runner.traits, throw, 3, 1000))
+        coarser = None if placed.change is None else runner(ask_of(runner.traits, throw, 2, 1000))
+    except ForeignError as error:
+        name = runner.traits.name
+        raise ForeignError(str(error) if name in str(error) else f"{name}: {error}") from None
+    level = plateau(answer.t, answer.omega, throw.omega0)
+    run = Run(placed.switches.name, throw, {"times": answer.t})
+    flown = make(run)
+    if flown.problem:
+        return placed, level, (0.0, math.inf)
+
+    def apart(omega: FloatArray) -> float:
+        return float(np.abs(answer.omega - omega).max()) / abs(throw.omega0)
+
+    change = None if coarser is None else apart(coarser.omega)
+    room = _room(change, placed.following_distance, runner.traits.epsilon) + float(omega_band(run).max())
+    return placed, level, (apart(flown.flight.omega), room)
 
 
 def shares(start: Switches, end: Switches, throw: Scenario) -> tuple[dict[str, float], float]:

@@ -84,14 +84,28 @@ class Finding:
     @property
     def threshold_text(self) -> str:
         """The admissible interval as the table prints it."""
-        return interval_text(self.admissible, self.value)
+        return interval_text(self.admissible, self.value, self._digits)
 
     @property
     def value_text(self) -> str:
         """The value with its unit."""
         if self.value is None:
             return "–"
-        return f"{self.value:#.3g} {self.unit}".strip() if self.value else f"0 {self.unit}".strip()
+        return f"{self.value:#.{self._digits}g} {self.unit}".strip() if self.value else f"0 {self.unit}".strip()
+
+    @property
+    def _digits(self) -> int:
+        """Significant digits, three or more, with which value and bounds as printed give the verdict."""
+        low, high = self.admissible
+        value = self.value
+        if value is None or not math.isfinite(value) or math.isnan(low) or math.isnan(high):
+            return 3
+
+        def telling(digits: int) -> bool:
+            shown, below, above = (float(f"{number:.{digits}g}") for number in (value, low, high))
+            return (below <= shown <= above) == (low <= value <= high) and (below < above or not low < high)
+
+        return next(filter(telling, range(3, 17)), 17)
 
     @property
     def band_text(self) -> str:

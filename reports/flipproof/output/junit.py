@@ -61,7 +61,8 @@ def _add_case(tests: ElementTree.Element, finding: Finding, suite: str, seconds:
     case = ElementTree.SubElement(tests, "testcase", words)
     numbers = f"{_numbers(finding)}, threshold {finding.threshold_text}"
     if finding.verdict == "fail":
-        failure = ElementTree.SubElement(case, "failure", {"message": _clean(numbers), "type": "threshold"})
+        message = "; ".join(filter(None, (numbers, finding.note)))
+        failure = ElementTree.SubElement(case, "failure", {"message": _clean(message), "type": "threshold"})
         failure.text = _clean(f"{finding.title}\n{numbers}\n{finding.note}")
     elif finding.verdict == "not evaluated":
         error = ElementTree.SubElement(case, "error", {"message": _clean(finding.note), "type": "not evaluated"})

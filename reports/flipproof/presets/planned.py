@@ -30,7 +30,6 @@ from flipproof.chapters.maps.study import (
     CURVE,
     EXTRA,
     LADDER,
-    NEGLIGIBLE,
     RUNGS,
     Axis,
     Reading,
@@ -114,7 +113,7 @@ class MapPlan:
 
     def runs(self) -> list[Run]:
         """Return every run; the output times are the solvers' own, so that a row repeats a run of the command line."""
-        return plan_map(self.throw, self.axis, self.fills, self.values, steps=STEPS, points=None)
+        return plan_map(self.throw, self.axis, self.fills, self.values, banded=True, steps=STEPS, points=None)
 
     def study(self, rows: Mapping[Run, Row]) -> ValidityMap:
         """Return the map that the rows of its runs make."""
@@ -132,7 +131,7 @@ def make_map(plan: MapPlan, out: Path, begin: Begin, **how: Any) -> str:
         write_whole(out / "map.json", json.dumps(map_facts(study, plan.throw), indent=1, allow_nan=False).encode())
         shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
         words = f"cells by largest fair share of omega/omega_0, mean of the second half, N = {study.slices}"
-        small = f", below {NEGLIGIBLE:g} {count}" if (count := _negligible(study)) else ""
+        small = f", too small or too near the next to tell {count}" if (count := _undecided(study)) else ""
         return f"{summary}\n{words}: {shares or 'none'}{small}; see {out / 'map.png'}"
 
 
@@ -161,7 +160,7 @@ def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
         "y": VALUES[study.axis],
         "ladder": list(LADDER),
         "cells by largest fair share": _dominating(study),
-        f"cells below {NEGLIGIBLE:g}": _negligible(study),
+        "cells undecided": _undecided(study),
         "cells without": int(study.missing.sum()),
         "contours": [
             {
@@ -180,7 +179,7 @@ def _dominating(study: ValidityMap) -> dict[str, int]:
     return {name: int((study.dominant == k).sum()) for k, name in enumerate(RUNGS)}
 
 
-def _negligible(study: ValidityMap) -> int:
+def _undecided(study: ValidityMap) -> int:
     return int((study.dominant < 0).sum() - study.missing.sum())
 
 

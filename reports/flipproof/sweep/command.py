@@ -18,13 +18,17 @@ from flipproof.sweep.design import read_design
 from flipproof.sweep.entries import try_entries
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.export import check_export, export
-from flipproof.sweep.loop import IN_FLIGHT, Progress, executor_of, fill
+from flipproof.sweep.loop import IN_FLIGHT, Progress, executor_of, fill, rows_of
 from flipproof.sweep.work import OUTCOMES, Point, code_identity, versions
+from slicemodel.scenario import shortened
 
 FILE: Final = "sweep.sqlite"
 """Name of the store in a sweep's folder."""
 
 KIND: Final = "sweep"
+
+NO_FLIGHT: Final = frozenset(("failed", "impossible", "worker-died"))
+"""Statuses of points that say in their reason why nothing was thrown."""
 
 Begin = Callable[[int], Progress]
 """Called once with the points of the design, when the work begins; returns what follows it."""
@@ -90,7 +94,15 @@ def completed(
         kinds = ", ".join(f"{counts[status]} {status}" for status in OUTCOMES if status in counts)
         rate = f"; {new_count} made in {seconds:.1f} s ({new_count / seconds:.0f} per second)" if new_count else ""
         stored = f"; {size - new_count} were there" if new_count < size else ""
-        yield store, f"{size} points in {store.path}: {kinds}{rate}{stored}"
+        yield store, f"{size} points in {store.path}: {kinds}{rate}{stored}{_first_failure(store, points, counts)}"
+
+
+def _first_failure(store: Store, points: Callable[[], Iterable[Point]], counts: Mapping[str, int]) -> str:
+    """Return why the first point in the order of the design has no flight, if one has none."""
+    if not counts.keys() & NO_FLIGHT:
+        return ""
+    reasons = (str(row["reason"]) for row in rows_of(store, points()) if row and row["status"] in NO_FLIGHT)
+    return f"\nthe first without a flight: {shortened(next(reasons, ''), 200)}"
 
 
 @contextmanager

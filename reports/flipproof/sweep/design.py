@@ -177,7 +177,9 @@ def _shares(table: Mapping[str, Any], where: str, axes: tuple[Axis, ...], *, gri
             if key in table:
                 raise SweepError(f'{where} {key} = {table[key]!r} belongs to design = "{LATIN}", not to a grid')
         return None
-    samples: Any = table.get("samples")
+    if "samples" not in table:
+        raise SweepError(f"{where} lacks samples: how many throws the Latin hypercube has")
+    samples: Any = table["samples"]
     seed = table.get("seed", 0)
     refuse(not_whole(f"{where} samples", samples, 1, MAX_POINTS) or not_whole(f"{where} seed", seed, 0, 2**63 - 1))
     if not any(isinstance(axis, Range) and axis.kind == "real" for axis in axes):
@@ -196,6 +198,11 @@ def _base(document: Mapping[str, Any], source: str, axes: tuple[Axis, ...]) -> M
     if swept and isinstance(capacity, int | float) and isinstance(scenario, Mapping):
         # The water is set by every point; the base's own must not be what is refused.
         tables["scenario"] = {**scenario, "water_mass": capacity / 2}
+    elif "bottle.capacity" in {axis.name for axis in axes} and isinstance(bottle, Mapping):
+        # So is the capacity; whether the water fits is said of every point.
+        water = scenario.get("water_mass", 0.5) if isinstance(scenario, Mapping) else 0.5
+        if isinstance(water, int | float) and isinstance(capacity, int | float) and water > capacity > 0:
+            tables["bottle"] = {**bottle, "capacity": water}
     try:
         return Scenario.from_mapping(tables, source=source).to_mapping()
     except ScenarioError as error:

@@ -7,12 +7,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, Final
 
 from flipproof.foreign.specs import check_asked, content_of
 from flipproof.frame.solvers import Solver, find, solve
 from flipproof.sweep.errors import SweepError, refuse_unknown
 from slicemodel.scenario import Scenario
+
+PER_THROW: Final = {"times": "; [sweep] curves = 101 keeps omega(t) at 101 equal times", "speeds": ""}
+"""Settings that suit a throw of one duration, or of one number of slices, and what to write in their place."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,8 @@ def read_entries(tables: object, source: str) -> tuple[Entry, ...]:
 
 def _entry(table: dict[str, Any], where: str) -> Entry:
     name = table.pop("name", None)
+    if name is None:
+        raise SweepError(f"{where} lacks a name; 'flipproof models' lists solvers")
     if not isinstance(name, str):
         raise SweepError(f"{where} name = {name!r} is not a solver's name; 'flipproof models' lists them")
     try:
@@ -56,6 +61,8 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
         raise SweepError(f"{where}: {error}") from None
     where = f"{where} ({name})"
     settings, open_ended = _settings_of(solver)
+    for key in table.keys() & PER_THROW.keys():
+        raise SweepError(f"{where} {key} belongs to one throw, not to a sweep{PER_THROW[key]}")
     if not open_ended:
         refuse_unknown(f"{where} key", table, settings)
     for key, value in table.items():
@@ -85,9 +92,8 @@ def try_entries(entries: tuple[Entry, ...]) -> None:
     That line, a SweepError, has the solver's own words.
     """
     for entry in entries:
-        # Output times belong to the duration of a throw; the grid is only counted here.
-        settings = {key: value for key, value in entry.settings.items() if key != "times"}
-        if isinstance(settings.get("steps"), int) and settings["steps"] > 2:
+        settings = dict(entry.settings)
+        if isinstance(settings.get("steps"), int) and settings["steps"] > 2:  # the grid is only counted here
             settings["steps"] = 2
         try:
             solve(entry.name, Scenario(n_slices=1, duration=1e-6), **settings)

@@ -68,6 +68,9 @@ SHARED: Final = {"times", "rest_speed", "energy"}
 READ: Final = ("plateau", "omega_end", "theta_end", "r_cm_end", "t_end", "impacts", "status", "message", "reason")
 """What a row holds of a flight."""
 
+COARSE_PLATEAU: Final = 1e-3
+"""Difference of a plateau from the mean that theta gives above which a message says so."""
+
 CURVES: Final = ("omega", "theta", "r_cm", "v_cm")
 """What a row's curves show [rad/s, rad, m, m/s]."""
 
@@ -248,8 +251,20 @@ def read_flight(flight: Trajectory | Row) -> Row:
     if flight.impacts is None:
         reasons.append(f"{flight.method} counts no impacts")
     row["impacts"] = None if flight.impacts is None else len(flight.impacts)
-    ending = {"t_end": float(flight.t[-1]), "status": flight.status, "message": flight.message}
+    message = "; ".join(filter(None, (flight.message, _coarse_plateau(flight, row["plateau"]))))
+    ending = {"t_end": float(flight.t[-1]), "status": flight.status, "message": message}
     return row | ending | {"reason": "; ".join(reasons)}
+
+
+def _coarse_plateau(flight: Trajectory, level: float | None) -> str:
+    """Return what theta says of a plateau of an equation whose output times are too few for it, else nothing."""
+    if level is None or flight.solver != "ode_reference":
+        return ""
+    (begin, *_, end), theta = flight.t, flight.theta
+    middle = (begin + end) / 2
+    turned = float(theta[-1] - np.interp(middle, flight.t, theta)) / (end - middle) / flight.scenario.omega0
+    few = abs(turned - level) > COARSE_PLATEAU
+    return f"plateau: {len(flight.t)} output times are few; by theta it is {turned:.4f}" if few else ""
 
 
 def _curves(flight: Trajectory | Row, points: int, names: Sequence[str]) -> Row:

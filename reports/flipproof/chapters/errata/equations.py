@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -43,6 +43,7 @@ class Erratum:
     prints, follows : str - what stands there; what its own earlier equations demand
     number : Number - what separates the two
     note : str - further numbers
+    fault : str - the verdict if print and truth differ
     """
 
     place: str = ""
@@ -50,14 +51,15 @@ class Erratum:
     follows: str = ""
     number: Number = UNKNOWN
     note: str = ""
+    fault: str = "erratum"
 
     @property
-    def verdict(self) -> Literal["erratum", "as printed", "not evaluated"]:
+    def verdict(self) -> str:
         """Return the verdict; NaN decides nothing."""
         if not math.isfinite(self.number.value):
             return "not evaluated"
         low, high = self.number.admissible
-        return "as printed" if low <= self.number.value <= high else "erratum"
+        return "as printed" if low <= self.number.value <= high else self.fault
 
 
 def printed_9c(x: float, v: float, gamma: float, omega: float, t: float) -> float:

@@ -18,7 +18,8 @@ def erratum_matlab_damping(throw: Scenario) -> Erratum:
     """Show that the MATLAB program writes alpha/2/M_W/N in its position update, alpha/2/M_W*N everywhere else."""
     from slicemodel.schemes import SCHEMES
 
-    constants = SCHEMES["published-matlab"].constants(throw if throw.drag else replace(throw, drag=0.01))
+    throw = (throw if throw.drag else replace(throw, drag=0.01)).with_slices(500)  # of Main.m
+    constants = SCHEMES["published-matlab"].constants(throw)
     return Erratum(
         place="Supplement, FindNewlocation.m",
         prints="alpha/2/M_W/N in the position update",
@@ -89,6 +90,7 @@ def erratum_defaults() -> Erratum:
         prints="beta = −0.3, t_max = 0.6, water_mass = 0.1",
         follows="section 5: β = −0.5, T = 0.5 s, M_w from 0.05 to 1 kg",
         number=Number(abs(levels[0] - levels[1]), "of ω₀ on the plateau", (0.0, 1e-3)),
+        fault="another throw",
         note=f"plateau {levels[0]:.4f} as supplied, {levels[1]:.4f} with the paper's β and T, both at M_w = 0.1 kg",
     )
 

@@ -116,7 +116,7 @@ def _exhibit(study: ValidityMap) -> Exhibit:
         caption=f"Every cell is a throw. The shade of a cell is {shade} in the plateau, the mean of "
         "ω/ω₀ over the second half. "
         f"The outline around cells names the assumption with the largest {which} in the plateau; cells without one "
-        f"have no share of {NEGLIGIBLE:g} of ω₀ or more. "
+        f"have no share of {NEGLIGIBLE:g} of ω₀ or more, or two that differ by less than the band of free flight. "
         f"The contours are where {contours}. Hatched cells could not be computed.{_thrown_words(study)}"
         f"{_band_words(study)}",
         alt=f"Map of {dominant.size} throws of {study.slices} slices, fill fraction {study.fills[0]:g} to "

@@ -140,9 +140,16 @@ class ValidityMap:
 
     @property
     def dominant(self) -> NDArray[np.int64]:
-        """Index into RUNGS of the largest fair share; -1 where any is missing, or none reaches ``NEGLIGIBLE``."""
+        """Index into RUNGS of the largest fair share; -1 where none is.
+
+        None is where a share is missing, all are below ``NEGLIGIBLE``, or the next is nearer than free flight's band.
+        """
         sizes = np.nan_to_num(np.abs(self.shares), nan=0.0)
-        return np.where(self.missing | (sizes.max(axis=0) < NEGLIGIBLE), -1, sizes.argmax(axis=0))
+        *_, second, first = np.sort(sizes, axis=0)
+        unsure = first < NEGLIGIBLE
+        if self.band is not None:
+            unsure |= ~(first - second >= self.band)
+        return np.where(self.missing | unsure, -1, sizes.argmax(axis=0))
 
 
 def vary(throw: Scenario, *, fill: float, damping: float | None = None, restitution: float | None = None) -> Scenario:

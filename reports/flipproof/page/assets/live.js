@@ -66,7 +66,7 @@ window.flipproofLive = (() => {
   // which errors grow, and strong drag, which pulls a light bottle along, get more. What wants more than MOST is not computed.
   const MOST = 400;
   const cuts = (step, ...rates) => Math.max(1, Math.ceil(step * Math.max(...rates) * (1 - 1e-9)));
-  const percent = (share) => (Number.isFinite(share) ? `${Number((100 * share).toPrecision(share < 1 ? 2 : 3))} %` : "not computable");
+  const percent = (share) => (Number.isFinite(share) ? `${Number((100 * (share < 1e-8 ? 0 : share)).toPrecision(share < 1 ? 2 : 3))} %` : "not computable");
 
   const restSpeed = ({ omega0, bottle }) => Math.max(1e-5, 1e-3 * Math.min(1, (Math.abs(omega0) * bottle.length) / 5.6));
 
@@ -232,5 +232,5 @@ window.flipproofLive = (() => {
     return omega;
   }
 
-  return { MOST, cuts, percent, program, eq8: (thrown, ...how) => flow(thrown, false, ...how), free: (thrown, ...how) => flow(thrown, true, ...how) };
+  return { MOST, cuts, percent, restSpeed, program, eq8: (thrown, ...how) => flow(thrown, false, ...how), free: (thrown, ...how) => flow(thrown, true, ...how) };
 })();

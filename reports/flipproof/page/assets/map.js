@@ -33,7 +33,7 @@
       const means = data.solvers.map((name, k) => `${names[name]} ${value(cell.mean[k])}`).join(", ");
       const far = off(cell);
       said.textContent = `At filling ${Number(cell.x.toPrecision(3))} and γ/ω₀ = ${Number(cell.y.toPrecision(2))} the late spin, as a share of ω₀, is: ${means}. `
-        + `Off free flight: ${names[choice.value]} by ${Number.isFinite(far) ? `${Number((100 * far).toPrecision(2))} %` : "an unknown part"}. Largest fair share: ${cell.which || (Number.isFinite(far) ? "none that matters" : "unknown")}.`;
+        + `Off free flight: ${names[choice.value]} by ${Number.isFinite(far) ? `${Number((100 * far).toPrecision(2))} %` : "an unknown part"}. Largest fair share: ${cell.which || (Number.isFinite(far) ? "none that can be told" : "unknown")}.`;
       const box = svg.querySelector(".map-here");
       box?.setAttribute("transform", svg.querySelector(`[data-cell="${i} ${j}"]`).dataset.place);
     }
@@ -60,7 +60,10 @@
       regions(x, y, w, h);
       chart.words("drag γ/ω₀ [1], logarithmic", { x: 2, y: 12 }, svg);
       chart.words("filling M_w / M_max [1]", { x: width - edge.right, y: edge.top + ny * h + 32, "text-anchor": "end" }, svg);
-      data.fills.forEach((fill, i) => { if (Math.abs(fill * 10 - Math.round(fill * 10)) < 1e-9 && (w > 24 || Math.round(fill * 10) % 2 === 0)) chart.words(fill.toFixed(1), { x: x(i) + w / 2, y: edge.top + ny * h + 15, "text-anchor": "middle" }, svg); });
+      for (let fill = 0.2; fill < data.fills.at(-1) + 0.01; fill += 0.2) { // equally spaced fillings, as cells from the first
+        const i = (fill - data.fills[0]) / (data.fills[1] - data.fills[0]);
+        if (i >= 0) chart.words(fill.toFixed(1), { x: x(i) + w / 2, y: edge.top + ny * h + 15, "text-anchor": "middle" }, svg);
+      }
       data.dampings.forEach((value, j) => { if (j % 4 === 0 || j === ny - 1) chart.words(String(Number(value.toPrecision(2))), { x: edge.left - 6, y: y(j) + h / 2 + 4, "text-anchor": "end" }, svg); });
       const key = edge.top + ny * h + 40, part = (width - edge.left - edge.right) / 5;
       ["≤ 1 % of ω₀", "≤ 3 %", "≤ 10 %", "≤ 30 %", "more"].forEach((words, k) => {

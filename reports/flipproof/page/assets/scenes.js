@@ -9,14 +9,14 @@
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const { percent } = live;
 
-  // A flight as frames: omega, angle, centre of mass and water, both from the cap.
+  // A flight as frames: omega / omega_0, angle, centre of mass and water, both from the cap.
   function flight(solver, thrown) {
-    const half = thrown.bottle.length / 2, theta = new Float64Array(FRAMES), centre = [], water = [];
+    const half = thrown.bottle.length / 2, share = (omega) => omega / thrown.omega0, theta = new Float64Array(FRAMES), centre = [], water = [];
     if (solver === "rods") {
       const omega = live.rods(thrown, FRAMES, (piles, place) => { water.push(piles); centre.push(place); });
       theta[0] = thrown.theta0;
       for (let k = 1; k < FRAMES; k++) theta[k] = theta[k - 1] + ((omega[k - 1] + omega[k]) / 2) * (thrown.duration / (FRAMES - 1));
-      return { omega, theta, centre, water };
+      return { spin: omega.map(share), theta, centre, water };
     }
     const bare = solver === "bare", set = bare || solver === "still" ? { ...thrown, g: 0, gamma: bare ? 0 : thrown.gamma } : thrown;
     const omega = live[set === thrown ? solver : "eq8"](set, FRAMES, (y, angle, place) => {
@@ -24,7 +24,7 @@
       water.push(Float64Array.from(y, (at) => at + half));
       centre.push(place + half);
     });
-    return { omega, theta, centre, water };
+    return { spin: omega.map(share), theta, centre, water };
   }
   const farthest = (one, other) => one.reduce((most, value, k) => Math.max(most, Math.abs(value - other[k])), 0);
 
@@ -73,8 +73,8 @@
       [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
       pen.setTransform(ratio, 0, 0, ratio, 0, 0);
       const wide = width / solvers.length, scale = Math.min(106, 0.4 * wide) / Math.max(fixed.bottle.length, 2 * fixed.bottle.radius), reach = 0.85 * fixed.bottle.length * scale;
-      const high = Math.max(1, ...now.flatMap(({ omega }) => [...omega].map((value) => value / thrown.omega0)).filter(Number.isFinite)) * 1.05;
-      const down = (value) => height - 18 - (value / thrown.omega0 / high) * (CURVES - 30);
+      const high = Math.max(1, ...[...now, ...(before ?? [])].flatMap(({ spin }) => [...spin]).filter(Number.isFinite)) * 1.05;
+      const down = (value) => height - 18 - (value / high) * (CURVES - 30);
       const across = (k, left) => left + 8 + (k / (FRAMES - 1)) * (wide - 22);
       solvers.forEach((solver, j) => {
         const left = j * wide, flown = now[j], colour = style(`--solver-${COLOURS[solver]}`);
@@ -88,23 +88,23 @@
         const ghosts = wide < 330 ? 125 : 50;
         for (let k = 0; k < frame - 20; k += ghosts) bottle(solver, flown, scale, place(k / (FRAMES - 1), left, wide, reach), k, 0.4);
         bottle(solver, flown, scale, place(frame / (FRAMES - 1), left, wide, reach), frame);
-        const curve = (omega, end, faint) => {
+        const curve = (spin, end, faint) => {
           pen.globalAlpha = faint ? 0.4 : 1;
           pen.strokeStyle = faint ? style("--soft") : colour;
           pen.lineWidth = faint ? 4 : 2;
           pen.beginPath();
-          for (let k = 0; k <= end; k++) pen.lineTo(across(k, left), down(omega[k]));
+          for (let k = 0; k <= end; k++) pen.lineTo(across(k, left), down(spin[k]));
           pen.stroke();
           pen.globalAlpha = 1;
         };
-        if (before) curve(before[j].omega, FRAMES - 1, true);
-        curve(flown.omega, frame, false);
+        if (before) curve(before[j].spin, FRAMES - 1, true);
+        curve(flown.spin, frame, false);
         pen.font = `600 14px ${getComputedStyle(canvas).fontFamily}`;
         pen.fillStyle = colour;
         pen.fillText(NAMES[solver], left + 8, 16);
         pen.font = `12px ${getComputedStyle(canvas).fontFamily}`;
         pen.fillStyle = style("--soft");
-        const share = Number.isFinite(flown.omega[frame]) ? `${(100 * flown.omega[frame] / thrown.omega0).toFixed(0)} %` : percent(NaN), time = `${(fixed.duration * frame / (FRAMES - 1)).toFixed(2)} s`;
+        const share = Number.isFinite(flown.spin[frame]) ? `${(100 * flown.spin[frame]).toFixed(0)} %` : percent(NaN), time = `${(fixed.duration * frame / (FRAMES - 1)).toFixed(2)} s`;
         const spin = `${time}: spin ${share}`, whole = `${spin} of the initial spin`;
         pen.fillText(pen.measureText(whole).width < wide - 22 ? whole : spin, left + 8, height - 6);
       });
@@ -123,8 +123,8 @@
     }
     function told() {
       if (!before) return;
-      const moved = now.map(({ omega }, j) => Math.abs(farthest(omega, before[j].omega) / thrown.omega0));
-      if (slider) said.textContent = now.map((_, j) => `${NAMES[solvers[j]]}: ω moves by up to ${percent(moved[j])} of ω₀.`).join(" ");
+      const moved = now.map(({ spin }, j) => farthest(spin, before[j].spin));
+      if (slider) said.textContent = now.map((_, j) => `${NAMES[solvers[j]]}: ω/ω₀ moves by up to ${percent(moved[j])}.`).join(" ") + " Grey: the first throw.";
       else said.textContent = thrown.g === usual.g
         ? root.dataset.asked
         : `Gravity is ${thrown.g ? "on (grey: off)" : "off (grey: on)"}. This moves the spin of Eq. 8 by up to ${percent(moved[0])} of the initial spin, that of free flight by ${percent(moved[1])}. Gravity makes bottle and water fall together: in flight it cannot move one against the other.`;

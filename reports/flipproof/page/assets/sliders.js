@@ -9,7 +9,7 @@
   const find = (name) => root.querySelector(`[data-testid="live-${name}"]`);
   const inputs = [...root.querySelectorAll("input")];
   const names = { "published-python": "program", eq8: "Eq. 8", "free-flight": "free flight", column: "column", rods: "rods" };
-  let thrown = { ...start }, drawn = {}, waiting = false, touched = null;
+  let thrown = { ...start }, drawn = {}, waiting = false, touched = null, doubting = 0;
 
   // The program makes its 1000 steps; of the equations as many points as a frame of 16 ms allows.
   const solvers = { "published-python": [program, 1000], eq8: [eq8, 251], "free-flight": [free, 251, null, 1], column: [column, 251], rods: [rods, 251] };
@@ -60,7 +60,22 @@
     find("said").textContent = changed
       ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves by at most, as shares of ω₀: ${apart((name) => before[name]).join(", ")}.`
       : `The largest differences from free flight are, as shares of ω₀: ${apart(() => now["free-flight"]).join(", ")}.`;
+    if (high > 6) find("said").textContent += " Curves leave the chart at 6 ω₀.";
+    clearTimeout(doubting);
+    doubting = setTimeout(doubt, 300, now["free-flight"]);
     drawn = { thrown: { ...fixed, ...thrown }, curves: now, before, milliseconds: performance.now() - began };
+  }
+  // Where recoil lets rests decide the order of impacts, twins of free flight, with other steps, rests and last digits of
+  // filling and spin, become other flights: twice as far as they part is how uncertain it is.
+  function doubt(omega) {
+    const set = { ...fixed, ...thrown }, rest = live.restSpeed(set);
+    const twins = [[{}, rest / 10], [{ omega0: set.omega0 * (1 + 1e-9) }, rest], ...[1e-8, 1e-7].map((less) => [{ fill: set.fill * (1 - less) }, rest])];
+    const apart = twins.map(([change, slow]) => {
+      const other = free({ ...set, ...change }, 251, null, 2, slow);
+      return omega.reduce((most, value, k) => Math.max(most, Math.abs(value - other[k])), 0);
+    });
+    const band = (2 * Math.max(...apart)) / Math.abs(thrown.omega0);
+    if (band > 0.005) find("said").textContent += ` Free flight is uncertain by about ${live.percent(band)}: rounding decides the order of impacts.`;
   }
   function set(change) {
     thrown = { ...thrown, ...change };
@@ -75,7 +90,9 @@
   find("reset").addEventListener("click", () => { set(start); remember(); });
   function recall() {
     const asked = Object.entries(window.flipproofState.linked("live")).map(([name, text]) => [name, Number(text)]);
-    set({ ...start, ...Object.fromEntries(asked.filter(([name, value]) => name in start && Number.isFinite(value))) });
+    const within = ({ name, min, max }, value) => Math.min(Number(max), Math.max(Number(min), value / (scale[name] ?? 1))) * (scale[name] ?? 1);
+    const known = asked.map(([name, value]) => [name, value, inputs.find((input) => input.name === name)]);
+    set({ ...start, ...Object.fromEntries(known.filter(([, value, input]) => input && Number.isFinite(value)).map(([name, value, input]) => [name, within(input, value)])) });
   }
   window.addEventListener("hashchange", () => { if (location.hash.startsWith("#live?")) recall(); });
   window.addEventListener("load", () => setTimeout(recall, 0));
