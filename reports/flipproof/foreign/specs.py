@@ -89,7 +89,7 @@ def locate(spec: str) -> EntryPoint | tuple[str, str]:
 
     A spec that names nothing raises a ValueError that says how specs are written.
     """
-    forms = "package.module:name, file.py:name, csv:file.csv or cmd:'program {scenario} {times} {out}'"
+    forms = "package.module:name, file.py:name, csv:FOLDER or cmd:'program {scenario} {times} {out}'"
     source, _, name = spec.rpartition(":")
     if not source:
         points = offered()

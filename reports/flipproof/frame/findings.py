@@ -109,8 +109,8 @@ class Finding:
 
     @property
     def band_text(self) -> str:
-        """The numerical band with its rule, or a dash."""
-        if self.band is None or math.isnan(self.band.size):
+        """The numerical band with its rule, or a dash where none is known to be above zero."""
+        if self.band is None or not self.band.size > 0.0:
             return "–"
         return f"± {self.band.size:.1g} ({self.band.rule})"
 
