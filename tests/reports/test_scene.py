@@ -1,5 +1,6 @@
 """A throw as a scene of other engines: what MuJoCo holds, and how it flies, is what was meant."""
 
+import importlib.util
 import json
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from made_up import command, refused
 
 import ode_reference
 from flipproof.output.scene import write_scene
-from slicemodel import Scenario
+from slicemodel import Bottle, Scenario
 
 THROW = Scenario(omega0=-12.0, theta0=0.7).with_slices(4)
 
@@ -59,6 +60,41 @@ def test_answers_that_hang_on_the_last_digits_say_so(tmp_path):
     words = write_scene(long, tmp_path)
     assert words.startswith("free-flight: omega(t) may be trusted to 0.001 omega_0 until t = ")
     assert json.loads((tmp_path / "scene.json").read_text())["doubt"] == words
+
+
+@pytest.mark.parametrize(("restitution", "chaotic"), [(0.5, False), (1.0, True)])
+def test_impacts_are_stated_until_a_twin_has_others(restitution, chaotic, tmp_path):
+    """Without losses ten slices strike hundreds of times, and one part in 1e12 of the spin makes another list."""
+    base = replace(Scenario().with_slices(10), drag=1.0, restitution=restitution, duration=0.3)
+    facts = []
+    for k, omega0 in enumerate((20.0, 20.0 * (1 + 1e-12))):
+        (tmp_path / str(k)).mkdir()
+        write_scene(replace(base, omega0=omega0), tmp_path / str(k))
+        facts.append(json.loads((tmp_path / str(k) / "scene.json").read_text()))
+    until = facts[0]["impacts_until"]
+    assert (until is not None) == chaotic
+    end = (until or 1.0) - 1e-4
+    one, other = (
+        [(hit["slice"], hit["end"], round(hit["time"], 5)) for hit in fact["impacts"] if hit["time"] < end]
+        for fact in facts
+    )
+    assert one == other
+    assert len(one) > 10
+
+
+def test_a_bottle_as_light_as_its_slices_are_written_has_no_scene(tmp_path):
+    tiny = Bottle(length=0.01, radius=0.002, mass=1e-6, capacity=1e-5)
+    with pytest.raises(ValueError, match=r"n_slices = 5: slices of a scene have 1e-12 kg m\^2 each, 0\.\d+ of the"):
+        write_scene(Scenario(bottle=tiny, water_mass=5e-6, n_slices=5, drag=1e-7), tmp_path)
+
+
+def test_an_engine_that_is_not_installed_is_named(tmp_path):
+    write_scene(THROW, tmp_path)
+    if importlib.util.find_spec("newton"):
+        pytest.skip("newton is installed")
+    done = read_back(tmp_path, "newton")
+    assert done.stderr.startswith("newton is not installed (")
+    assert done.returncode == 1
 
 
 @pytest.mark.parametrize("name", ["mass", "diaginertia"])
@@ -115,6 +151,6 @@ def test_the_command_writes_the_folder_and_refuses_ice(tmp_path, capsys):
 
 def test_a_flight_that_stops_before_its_end_has_no_scene(tmp_path, monkeypatch):
     stopped = replace(ode_reference.solve(THROW), status="stalled", message="too stiff")
-    monkeypatch.setattr("ode_reference.solve", lambda *_: stopped)
+    monkeypatch.setattr("flipproof.output.scene.solve_timed", lambda *_: (stopped, 0.0))
     with pytest.raises(ValueError, match="there are no answers for this throw: stalled: too stiff"):
         write_scene(THROW, tmp_path)

@@ -195,7 +195,9 @@ def command_export(options: argparse.Namespace) -> int:
     import numpy as np
 
     from flipproof.film.tracker.export import at_times, data_track_text, frame_times, until_landing
-    from flipproof.frame.solvers import find, solve
+    from flipproof.frame.solvers import find
+    from flipproof.frame.timing import solve_timed
+    from flipproof.frame.twins import doubt
     from flipproof.output.folder import write_text
     from slicemodel.trajectory import output_times
 
@@ -205,12 +207,14 @@ def command_export(options: argparse.Namespace) -> int:
     solver = find(options.solver)
     # A scheme has its own grid, between whose points frames are interpolated.
     exact = {} if solver.package == "slicemodel" else {"times": np.union1d(output_times(scenario, None), times)}
-    run = solve(solver.name, scenario, **exact)
+    run, seconds = solve_timed(solver.name, scenario, **exact)
+    if warning := doubt(run, seconds):
+        print(f"flipproof: {warning}", file=sys.stderr)
     if not run.ok:
         print(f"flipproof: {options.solver}: {run.status}: {run.message}", file=sys.stderr)
     frames = at_times(run, times[times <= run.t[-1]])
     if options.height is not None:
-        frames, landing = until_landing(run, frames, options.height)
+        frames, landing = until_landing(run, frames, options.height, options.start)
         print(f"flipproof: {landing}", file=sys.stderr)
     table = data_track_text(frames, start=options.start, origin=options.origin)
     if options.out:

@@ -29,5 +29,5 @@ def command_scene(options: argparse.Namespace) -> int:
     print(f"{options.out}: the scene, scene.json, answers.csv")
     if doubted:
         print(f"answers.csv, {doubted}")
-    print(f"python {options.out / 'readback.py'} {engine}  # holds masses and inertias of an engine against scene.json")
+    print(f"python {options.out / 'readback.py'} {engine}  # compares what an engine reads with scene.json")
     return 0

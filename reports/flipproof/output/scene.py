@@ -12,34 +12,56 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 import ode_reference
 from flipproof.frame.columns import json_ready
+from flipproof.frame.timing import solve_timed
 from flipproof.frame.twins import doubt
 from flipproof.output.folder import write_text
 from flipproof.output.tables import trajectory_csv
+from ode_reference.bands import TWINS
+from slicemodel import Trajectory
+from slicemodel.observables import initial_moment_of_inertia
 from slicemodel.scenario import Scenario
 
 SLICE_INERTIA: Final = 1e-12
 """Moment of inertia of a slice about its own centre [kg m^2]: 1e-9 of that of the paper's bottle."""
+
+MAX_INERTIA: Final = 1e-6
+"""Share of the moment of inertia at release that the slices' own may have."""
+
+SAME: Final = 1e-6
+"""How far the times of one impact of two twins may differ [s]."""
+
+FRAME: Final = (
+    "SI units; x to the right, y up, gravity along -y; x = y = 0 is the centre of mass at release; theta about z, 0 "
+    "with the base below the cap; r from the cap. qpos: x and y of the tube's centre, theta, r_0 to r_(N-1); qvel: "
+    "their rates. In a URDF the base floats."
+)
 
 
 def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> str:
     """Write scene.xml or scene.urdf, scene.json (masses, inertias, release, impacts), answers.csv and readback.py.
 
     The answers are free flight by ``ode_reference``; returns how long omega(t) of it may be trusted, if not to the end.
-    Raises ValueError for ice, whose slices have no joints, and for a flight that stops before its end, and OSError if
-    the folder cannot be written.
+    Raises ValueError for ice, whose slices have no joints, for a bottle so small that the slices' own inertia counts,
+    and for a flight that stops before its end, and OSError if the folder cannot be written.
     """
     if throw.frozen:
-        raise ValueError("frozen = true: the slices of a scene move")
-    began = time.perf_counter()
-    flight, bottle = ode_reference.solve(throw, "free-flight"), throw.bottle
-    doubted = doubt(flight, time.perf_counter() - began)
+        raise ValueError("frozen = true: a scene is of liquid water, whose slices move; set frozen = false")
+    own = throw.n_slices * SLICE_INERTIA / initial_moment_of_inertia(throw)
+    if own > MAX_INERTIA:
+        raise ValueError(
+            f"n_slices = {throw.n_slices}: slices of a scene have {SLICE_INERTIA:g} kg m^2 each, {own:.2g} of the "
+            f"throw's moment of inertia, more than {MAX_INERTIA:g}; take a larger bottle or fewer slices"
+        )
+    (flight, seconds), bottle = solve_timed("free-flight", throw), throw.bottle
+    doubted = doubt(flight, seconds)
     if not flight.ok:
         raise ValueError(f"there are no answers for this throw: {flight.status}: {flight.message}")
     across = bottle.mass * (bottle.radius**2 / 2 + bottle.length**2 / 12)  # Eq. 11a
@@ -54,11 +76,13 @@ def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> str:
     scene = "scene.urdf" if form == "urdf" else "scene.xml"
     facts = {
         "scene": scene,
+        "frame": FRAME,
         "scenario": throw.to_mapping(),
         "bodies": bodies,
         "qpos": qpos,
         "qvel": qvel,
         "impacts": impacts,
+        "impacts_until": _impacts_until(flight),
         "doubt": doubted,
     }
     write_text(folder / scene, _urdf(throw, bodies) if form == "urdf" else _mjcf(throw, bodies, qpos, qvel))
@@ -66,6 +90,19 @@ def write_scene(throw: Scenario, folder: Path, form: str = "mjcf") -> str:
     write_text(folder / "answers.csv", trajectory_csv(flight))
     write_text(folder / "readback.py", Path(__file__).with_name("scene_readback.py").read_text(encoding="utf-8"))
     return doubted
+
+
+def _impacts_until(flight: Trajectory) -> float | None:
+    """Return when the first impact may be another, since a twin of the throw has another there; None if none has."""
+    times = []
+    for twin in range(1, TWINS + 1):
+        other = ode_reference.solve(flight.scenario, "free-flight", flight.t[[0, -1]], twin=twin)
+        lists = [list(run.impacts or ()) for run in (flight, other)]
+        pairs = zip(*lists, strict=False)
+        same = [(a.slice, a.end) == (b.slice, b.end) and abs(a.time - b.time) <= SAME for a, b in pairs]
+        first = same.index(False) if False in same else len(same)
+        times += [hits[first].time for hits in lists if first < len(hits)]
+    return float(np.min(times)) if times else None
 
 
 def _mjcf(throw: Scenario, bodies: dict[str, list[float]], qpos: list[float], qvel: list[float]) -> str:

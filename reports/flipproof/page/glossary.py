@@ -68,7 +68,8 @@ TERMS: Final[Mapping[str, str]] = {
     "certified": "Of an engine: the last halving of the step, twice the iterations and a slightly heavier or lighter "
     "bottle move ω by no more than the tolerance, and a single slice rebounds as asked.",
     "regression claim": "A statement that must hold in every report; if one fails, the report's exit status is 1.",
-    "observation": "A reported number that never sets the exit status, such as whether an equation meets a statement of the paper.",
+    "observation": "A reported number that never sets the exit status, such as whether an equation meets a "
+    "statement of the paper.",
     "ice": "Frozen water: no slice may move, so ω must stay constant.",
     "impact": "A slice strikes an end of the bottle; of a landing, the bottle strikes the table.",
 }  # fmt: skip

@@ -50,23 +50,24 @@ CHOSEN: Final = "chosen here"
 
 _ROWS: Final[tuple[tuple[Any, ...], ...]] = (
     # name, symbol, value, unit, where it is stated, what is said there, what is left open
-    ("length", "L", 0.28, "m", "section 5, first paragraph; caption of Fig. 1", "The bottle is 0.28 m tall."),
-    ("radius", "R", 0.04, "m", "section 5, first paragraph", "Its radius is 0.04 m."),
-    ("bottle-mass", "M_b", 0.028, "kg", "section 5, first paragraph",
+    ("length", "L", 0.28, "m", "section “Simulated … experiments”, first paragraph; caption of Fig. 1",
+     "The bottle is 0.28 m tall."),
+    ("radius", "R", 0.04, "m", "section “Simulated … experiments”, first paragraph", "Its radius is 0.04 m."),
+    ("bottle-mass", "M_b", 0.028, "kg", "section “Simulated … experiments”, first paragraph",
      "The empty bottle weighs 28 g.",
      "Section 4 says 20 to 30 g."),
     ("capacity", "M_max", 1.0, "kg", "section 3, first paragraph",
      "Filled to the cap it holds 1 kg of water.",
      "A cylinder of that length and radius holds 1.407 kg, so h / L is not M_tilde for both of Eq. 4a and 4b."),
-    ("density", "rho_w", 1000.0, "kg/m^3", "section 5, first paragraph",
+    ("density", "rho_w", 1000.0, "kg/m^3", "section “Simulated … experiments”, first paragraph",
      "Water has its usual density.",
      "Needed by Eq. 4b and 5 only; the figures use Eq. 4a, as the Python program does."),
     ("gravity", "g", 9.81, "m/s^2", "supplement, constants of the Python program",
      "The Python program takes 9.81 m/s^2.",
      "The MATLAB program takes 9.8 m/s^2."),
-    ("release-angle", "theta_0", math.pi / 2, "rad", "sections 4 and 5",
+    ("release-angle", "theta_0", math.pi / 2, "rad", "section 2, and both sections 5",
      "The bottle is let go lying flat unless a figure says otherwise."),
-    ("release-spin", "omega_0", 20.0, "rad/s", "section 5, first paragraph",
+    ("release-spin", "omega_0", 20.0, "rad/s", "section “Simulated … experiments”, first paragraph",
      "It is let go spinning at 20 rad/s, a measured value.",
      "“Numerical model” also gives omega_0 as v_0 / r_CM(0); the 2 m/s fitted to ice, an order of magnitude, would "
      "give 9.7 rad/s for the half-full bottle."),
@@ -103,9 +104,9 @@ _ROWS: Final[tuple[tuple[Any, ...], ...]] = (
     ("figure-5-drag", "alpha", 1.0, "kg/s", "caption of Fig. 5",
      "The caption says 1 for the drag.",
      "With 10 slices that is a damping rate alpha/2m of 10 /s, twice that of the later figures. In the published "
-     "program no slice then reaches the cap before 0.45 s, and omega comes back to omega_0 at mid-flight, where the "
-     "text sees rebounds from both ends and a low omega. The damping rate of the later figures, 5 /s, needs 0.5 and "
-     "shows both; both readings are drawn."),
+     "program no slice then reaches the cap before 0.45 s, and omega comes back to omega_0 at two thirds of the "
+     "flight, where the text sees rebounds from both ends and a low omega. The damping rate of the later figures, "
+     "5 /s, needs 0.5 and shows both; both readings are drawn."),
     ("figure-5-drag-at-5-per-second", "alpha", 0.5, "kg/s", CHOSEN,
      "The drag of ten slices that has the damping rate of all later figures.",
      "See figure-5-drag."),
@@ -129,7 +130,7 @@ _ROWS: Final[tuple[tuple[Any, ...], ...]] = (
      "Only 20 rad/s is named."),
     ("figure-8b-angle", "theta_0",
      tuple(math.radians(angle) for angle in (0.0, 30.0, 60.0, 90.0, 120.0)), "rad", CHOSEN,
-     "It is let go at other angles, down to nearly upright.",
+     "It is let go at other angles, down to upright.",
      "Only 0 and pi/2 are named."),
     ("figure-8c-aspect", "AR", (2.0, 3.5, 5.0, 7.0), "1", CHOSEN,
      "The bottle is made slimmer and wider with the volume of its cylinder kept.",

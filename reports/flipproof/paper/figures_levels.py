@@ -99,7 +99,7 @@ def _exhibits_9c(runs: PaperRuns) -> Iterator[Exhibit]:
     )
     yield panels.exhibit_grid(
         "9c", "velocity of the centre of mass on landing",
-        "Velocity dr_CM/dt along the bottle, positive towards the base as in the table of statements; the paper has it "
+        "Velocity dr_CM/dt along the bottle, positive towards the base; the paper has it "
         "negative and does not say which way it counts, nor whether "
         "it means θ = 2π (filled) or T = 0.5 s (open). Where the shaded ranges cross, its statement needs points "
         "outside the horizontal one. Its photographs are not drawn again.",

@@ -98,15 +98,19 @@ def at_times(run: Trajectory, times: FloatArray) -> Trajectory:
     )  # fmt: skip
 
 
-def until_landing(run: Trajectory, frames: Trajectory, height: float) -> tuple[Trajectory, str]:
-    """Return the frames before the bottle lands on a table, and how it lands, in words; refuse if it does not."""
+def until_landing(run: Trajectory, frames: Trajectory, height: float, start: float) -> tuple[Trajectory, str]:
+    """Return the frames before the bottle lands on a table, and how it lands, in words; refuse if it does not.
+
+    ``start`` is the time of the release in the video [s].
+    """
     touchdown = landing(run, height)
     if touchdown is None:
         raise ValueError(
             f"height = {height:g} m: the bottle does not come down on such a table within {run.t[-1]:g} s; choose a "
             "longer duration in the scenario, or another height"
         )
-    text = f"the {touchdown.end} lands at t = {touchdown.moment.time:.4f} s"
+    time = start + touchdown.moment.time
+    text = f"a rim of the {touchdown.end} touches the table at t = {time:.4f} s, after the last row"
     return at_times(frames, frames.t[frames.t <= touchdown.moment.time]), text
 
 
