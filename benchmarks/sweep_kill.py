@@ -54,7 +54,6 @@ method = "DOP853"
 rtol = 1e-6
 atol = 1e-9
 max_step = 0.01
-times = [0.0, 0.025, 0.05]
 """
 """Cheap throws; one in twenty is impossible, with more water than the bottle holds."""
 

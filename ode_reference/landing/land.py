@@ -77,7 +77,8 @@ def land(
         Certified if the energy falls below the saddle, no impact raises it by more than 1e-6 of the saddle, and four
         touches that differ by ``EDGE`` times the step (``Touch.twins``) and in what counts as touching
         (``TWINS_TOUCHING``) end alike with twice the step. Where they do not, step and difference are made ``REFINED``
-        times smaller, down to ``SHORTEST``.
+        times smaller, down to ``SHORTEST``. ``diagnostics`` has ``outcomes``, ``times`` [s] and ``bounces`` of the
+        runs: where these differ the runs are different motions, and that they end alike makes it likely only.
 
     Raises
     ------
@@ -265,5 +266,7 @@ def _outcome(runs: Sequence[Landing], shift: float, settings: Mapping[str, objec
             "steps": sum(landing.steps for landing in runs),
             "impacts": run.impacts,
             "outcomes": [names.get(landing.code, "") for landing in runs],
+            "times": [landing.time for landing in runs],
+            "bounces": [landing.bounces for landing in runs],
         },
     )

@@ -125,7 +125,7 @@ def check(
             was = old_findings.get(finding.id)
             moves = group == "thresholds" or (group == "guests" and finding.kind != "regression")
             if moves and was is None:
-                unknown.append(finding.id)
+                unknown += [] if summary is None else [finding.id]
                 continue
             if was is not None and group == "guests" and moves and was["value"] is None:
                 continue

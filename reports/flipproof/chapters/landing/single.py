@@ -17,6 +17,9 @@ from slicemodel.table import LAWS
 FLAT: Final = 1e-6
 """Tilt at the touch below which it is rounding that decides which rim strikes first [rad]."""
 
+SAME_MOTION: Final = 0.05
+"""Share by which the times may differ at which runs of one landing are decided, if they are one motion."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
@@ -75,13 +78,10 @@ def land_throw(
 
 def describe(rows: Sequence[Row], table: Table) -> str:
     """Return what happens as lines: the touch of each bottle, then a line for each landing."""
-    usual = Table(height=table.height)
-    assumed = [name for name in ("restitution", "friction") if getattr(table, name) == getattr(usual, name)]
-    words = f" ({' and '.join(assumed)} assumed: no measured value was found)" if assumed else ""
     slices = rows[0].touch.scenario.n_slices
     lines = [
-        f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g}{words}; "
-        f"N = {slices} slices"
+        f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g} (no "
+        f"measured values of a bottle on a table were found); N = {slices} slices"
     ]
     bottles: set[str] = set()
     for row in rows:
@@ -117,12 +117,20 @@ def _how(outcome: Outcome, *, flat: bool) -> str:
             f"{outcome.outcome}; it comes down flat, and which rim strikes first is rounding: when it is certain, how "
             "often it bounces and where its base comes to stand are chance"
         )
+    times, counts = outcome.diagnostics.get("times", []), outcome.diagnostics.get("bounces", [])
+    if len(set(counts)) > 1 or (times and max(times) - min(times) > SAME_MOTION * max(times)):
+        return (
+            f"{outcome.outcome} in all {len(times)} runs, whose motions differ: likely, not certain; the energy falls "
+            f"below the saddle {min(times):.2f} to {max(times):.2f} s after the touch, after {min(counts)} to "
+            f"{max(counts)} bounces"
+        )
     assert outcome.certified is not None
     assert outcome.margin is not None
     assert outcome.slid is not None
     below = f"{outcome.margin:.1%}" if outcome.margin >= 5e-4 else "less than 0.1%"
+    where = "the saddle out of its cap" if outcome.outcome == "cap" else "the saddle"
     return (
-        f"{outcome.outcome}; certain {outcome.certified:.3f} s after the touch, {below} below the saddle; "
+        f"{outcome.outcome}; certain {outcome.certified:.3f} s after the touch, {below} below {where}; "
         f"bounces {outcome.bounces}; by then the middle of its base has moved {1000 * outcome.slid:+.0f} mm along the "
         "table"
     )
