@@ -99,6 +99,9 @@ def test_the_site_is_built_by_one_command_and_its_links_lead_somewhere(tmp_path)
         for target in re.findall(r'(?:href|src)="([^"#]+)"', text):
             assert (tmp_path / target).exists(), f"{path.name}: {target}"
     assert "ω<sup>2</sup>" in (tmp_path / "theory.html").read_text(encoding="utf-8")
+    own = (tmp_path / "own-solver.html").read_text(encoding="utf-8")
+    assert "file=mine.py" not in own
+    assert re.search("<h2[^>]*>2. Ask which equation it solves</h2>", own)
     page = (tmp_path / "reference" / "slicemodel.html").read_text(encoding="utf-8")
     assert all(f'id="{name}"' in page for name in slicemodel.__all__)
 

@@ -11,6 +11,7 @@ import time
 import tomllib
 from collections import Counter
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from flipproof.sweep.errors import SweepError
 from flipproof.sweep.export import dataset, table
 from flipproof.sweep.loop import executor_of, fill, rows_of
 from flipproof.sweep.work import Point, Row, make_flights, read_flight, scenario_of
+from slicemodel import Scenario
 
 TEXT = """
 [sweep]
@@ -422,3 +424,13 @@ def test_what_was_planted_beside_the_file_is_refused_and_left_alone(swept, tmp_p
         filled(tmp_path / "sweep.sqlite", made)
     assert beside.exists()
     assert mine.read_text() == "notes, long enough for a header"
+
+
+def test_a_plateau_of_too_few_output_times_says_what_theta_gives():
+    """Eq. 8 without losses turns ever faster: a thousand times do not follow 160 s of it."""
+    throw = Scenario(n_slices=3, drag=0.0, restitution=1.0)
+    short, long = (read_flight(solve("eq8", replace(throw, duration=duration))) for duration in (0.5, 160.0))
+    assert short["message"] == ""
+    words, _, theta = long["message"].rpartition(" ")
+    assert words.endswith("plateau: 1000 output times are few; by theta it is")
+    assert abs(float(theta) - long["plateau"]) > 1e-3

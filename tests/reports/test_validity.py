@@ -151,6 +151,16 @@ def test_fair_shares_colour_a_map_where_every_set_was_flown():
     assert (study_map(THROW, "gamma", FILLS, (0.1, 0.2), missing).dominant == -1).sum() == 1
 
 
+def test_a_share_that_leads_by_less_than_the_band_is_not_named():
+    study = made_up("gamma", (0.1, 0.2, 0.3), by_rung(1))
+    *_, second, first = np.sort(np.abs(study.shares), axis=0)
+    lead = first - second
+    assert (lead > 0).all()
+    factors = np.array([[0.9, 1.1], [np.nan, 0.0], [2.0, 0.5]])
+    named = replace(study, band=factors * lead).dominant >= 0
+    assert named.tolist() == [[True, False], [False, True], [False, True]]
+
+
 def test_step_errors_are_held_against_the_scheme_s_own_equation():
     levels = {"published-python": 0.30, "published-limit": 0.33, "exact-step": 0.5, "eq8": 0.51}
     study = made_up("step", (0.01, 0.1), lambda run: levels.get(run.solver, 0.9))

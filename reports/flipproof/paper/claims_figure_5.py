@@ -274,7 +274,7 @@ def _cost_of_steps(_: CaseFlights, program: str = "MATLAB") -> Iterator[Reading]
 @states(
     "steps-enough",
     place="section 5, Supp. Fig. 1a",
-    says="All calculations take P = 1000 time steps, without loss.",
+    says="All calculations take P = 1000 time steps.",
     means="More steps change ω by at most 0.01 ω₀ (root mean square). For Eq. 8 the exact step at P = 1000 is held "
     "against the solution event by event.",
     throw="M̃ = 0.25, 0.5 and 0.75, α = 0.01 kg/s, β = −0.5",

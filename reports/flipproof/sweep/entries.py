@@ -61,8 +61,9 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
         raise SweepError(f"{where}: {error}") from None
     where = f"{where} ({name})"
     settings, open_ended = _settings_of(solver)
-    for key in table.keys() & PER_THROW.keys():
-        raise SweepError(f"{where} {key} belongs to one throw, not to a sweep{PER_THROW[key]}")
+    for key, instead in PER_THROW.items():
+        if key in table:
+            raise SweepError(f"{where} {key} belongs to one throw, not to a sweep{instead}")
     if not open_ended:
         refuse_unknown(f"{where} key", table, settings)
     for key, value in table.items():

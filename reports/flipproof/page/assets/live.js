@@ -68,6 +68,8 @@ window.flipproofLive = (() => {
   const cuts = (step, ...rates) => Math.max(1, Math.ceil(step * Math.max(...rates) * (1 - 1e-9)));
   const percent = (share) => (Number.isFinite(share) ? `${Number((100 * (share < 1e-8 ? 0 : share)).toPrecision(share < 1 ? 2 : 3))} %` : "not computable");
 
+  const farthest = (one, other) => one.reduce((most, value, k) => Math.max(most, Math.abs(value - other[k])), 0);
+
   const restSpeed = ({ omega0, bottle }) => Math.max(1e-5, 1e-3 * Math.min(1, (Math.abs(omega0) * bottle.length) / 5.6));
 
   // Omega of Eq. 8, or of free flight, at equal times. A slice slower than `rest` that its end presses on rests there;
@@ -232,5 +234,5 @@ window.flipproofLive = (() => {
     return omega;
   }
 
-  return { MOST, cuts, percent, restSpeed, program, eq8: (thrown, ...how) => flow(thrown, false, ...how), free: (thrown, ...how) => flow(thrown, true, ...how) };
+  return { MOST, cuts, percent, farthest, restSpeed, program, eq8: (thrown, ...how) => flow(thrown, false, ...how), free: (thrown, ...how) => flow(thrown, true, ...how) };
 })();

@@ -7,7 +7,7 @@
   const COLOURS = { eq8: "eq8", free: "free-flight", rods: "rods", still: "eq8", bare: "eq8" };
   const FRAMES = 251, SLOW = 9;
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const { percent } = live;
+  const { percent, farthest } = live;
 
   // A flight as frames: omega / omega_0, angle, centre of mass and water, both from the cap.
   function flight(solver, thrown) {
@@ -26,7 +26,6 @@
     });
     return { spin: omega.map(share), theta, centre, water };
   }
-  const farthest = (one, other) => one.reduce((most, value, k) => Math.max(most, Math.abs(value - other[k])), 0);
 
   function scene(root) {
     const solvers = root.dataset.bottles.split(" "), usual = start;

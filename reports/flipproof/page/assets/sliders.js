@@ -70,10 +70,7 @@
   function doubt(omega) {
     const set = { ...fixed, ...thrown }, rest = live.restSpeed(set);
     const twins = [[{}, rest / 10], [{ omega0: set.omega0 * (1 + 1e-9) }, rest], ...[1e-8, 1e-7].map((less) => [{ fill: set.fill * (1 - less) }, rest])];
-    const apart = twins.map(([change, slow]) => {
-      const other = free({ ...set, ...change }, 251, null, 2, slow);
-      return omega.reduce((most, value, k) => Math.max(most, Math.abs(value - other[k])), 0);
-    });
+    const apart = twins.map(([change, slow]) => live.farthest(omega, free({ ...set, ...change }, 251, null, 2, slow)));
     const band = (2 * Math.max(...apart)) / Math.abs(thrown.omega0);
     if (band > 0.005) find("said").textContent += ` Free flight is uncertain by about ${live.percent(band)}: rounding decides the order of impacts.`;
   }
@@ -89,10 +86,12 @@
   }
   find("reset").addEventListener("click", () => { set(start); remember(); });
   function recall() {
-    const asked = Object.entries(window.flipproofState.linked("live")).map(([name, text]) => [name, Number(text)]);
-    const within = ({ name, min, max }, value) => Math.min(Number(max), Math.max(Number(min), value / (scale[name] ?? 1))) * (scale[name] ?? 1);
-    const known = asked.map(([name, value]) => [name, value, inputs.find((input) => input.name === name)]);
-    set({ ...start, ...Object.fromEntries(known.filter(([, value, input]) => input && Number.isFinite(value)).map(([name, value, input]) => [name, within(input, value)])) });
+    const asked = { ...start }, linked = window.flipproofState.linked("live");
+    for (const { name, min, max } of inputs) { // what lies beyond a slider is its end
+      const unit = scale[name] ?? 1, value = Number(linked[name] ?? NaN);
+      if (Number.isFinite(value)) asked[name] = Math.min(max * unit, Math.max(min * unit, value));
+    }
+    set(asked);
   }
   window.addEventListener("hashchange", () => { if (location.hash.startsWith("#live?")) recall(); });
   window.addEventListener("load", () => setTimeout(recall, 0));
