@@ -379,6 +379,7 @@ def _motion_cause(intervals: Sequence[Interval], *, seldom: bool) -> str:
             "omega^2 L": omega**2 * throw.bottle.length * ones,
             "g cos(theta)": throw.gravity * np.cos(theta) * ones,
             "g sin(theta)": throw.gravity * np.sin(theta) * ones,
+            "g cos(theta_0 + omega_0 t)": throw.gravity * np.cos(i.angle_of_ice) * ones,
             DRAG_OF_EQ8: drag * (v[free] - share * v.mean()),
             DRAG_OF_FREE_FLIGHT: drag * v[free]
             + throw.drag * v[free].sum() / (throw.bottle.mass + throw.slice_mass * np.sum(~free)),

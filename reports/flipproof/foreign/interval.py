@@ -29,6 +29,7 @@ class Interval:
     Parameters
     ----------
     number, time : int, float - number of the throw, and when the interval begins [s]
+    angle_of_ice : float - theta_0 + omega_0 t of the whole throw in the middle of the interval [rad]
     throw : Started - the throw from the solver's state at its first output
     theta, omega, r, v : arrays, shapes (2,), (2,), (2, N), (2, N) - what the solver answers; SI units
     expected : mapping - by field what the equation gives at the second output
@@ -43,6 +44,7 @@ class Interval:
 
     number: int
     time: float
+    angle_of_ice: float
     throw: Started
     theta: FloatArray
     omega: FloatArray
@@ -124,6 +126,7 @@ def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[I
             Interval(
                 number=number,
                 time=float(answer.t[k]),
+                angle_of_ice=throw.theta0 + throw.omega0 * float(answer.t[rows].mean()),
                 throw=state,
                 theta=answer.theta[rows],
                 omega=answer.omega[rows],

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import InProcess
+from planted import InProcess, Patch
 
 import ode_reference
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
@@ -73,6 +73,15 @@ def test_a_term_or_an_impact_that_is_wrong_is_named_with_its_factor(thrown, besi
     line = told(Exact, WHOLE, besides, thrown=thrown)
     for part in words:
         assert part in line
+
+
+def test_a_weight_that_takes_the_angle_of_ice_is_named():
+    change = "math.cos(theta)", "math.cos(throw.theta0 + throw.omega0 * (t + ask.times[0] / 2))"
+    solver = InProcess(Patch("The weight turns as ice does.", "midpoint", (change,)).solver(), "x")
+    throws = [WHOLE.ask(0), WEIGHTLESS.ask(0)]
+    where, cause = drive(departing(solver.traits, "eq8", throws), solver)
+    assert "where there is weight" in where
+    assert "x g cos(theta_0 + omega_0 t) besides" in cause
 
 
 def half_of_own_inertia(_, throw, flight):

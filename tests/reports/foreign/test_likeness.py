@@ -13,7 +13,7 @@ from flipproof.foreign.certify import certify
 from flipproof.foreign.checking import drive
 from flipproof.foreign.contract import started
 from flipproof.foreign.likeness.flight import Mistake, fly
-from flipproof.foreign.likeness.mistakes import FAR, FITTED, FLOOR, MISTAKES, SLOW, THROWS, naming
+from flipproof.foreign.likeness.mistakes import FAR, FITTED, FLOOR, MISTAKES, SLOW, THROWS, _is_near, naming
 
 
 def flown(ask, factors, equation=()):
@@ -178,3 +178,16 @@ def test_the_line_of_a_check_of_motion_names_the_mistake():
     solver = InProcess(Thrown(lambda s: {"restitution": s.restitution**2}), "x")
     (result,) = certify(solver, ["equation"]).results
     assert result.text.endswith("it answers like a solver in which an impact multiplies the speed by e^2")
+
+
+@pytest.mark.parametrize(
+    ("with_mistake", "near"),
+    [
+        ((0.1, 3.8, 1.2, 54.0), True),  # a hundred times nearer, in the mean
+        ((0.1, 30.0, 1.9, 200.0), False),
+        ((0.1, 30.0, 0.9, 200.0), True),  # right on one throw
+        ((0.1, 0.5, 0.5, 500.0), False),  # hardly nearer on one
+    ],
+)
+def test_a_mistake_is_near_that_is_much_nearer_than_its_equation(with_mistake, near):
+    assert _is_near(with_mistake, (0.1, 3000.0, 200.0, 5000.0)) == near

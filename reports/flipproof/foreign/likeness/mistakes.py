@@ -57,7 +57,7 @@ NEARER: Final = 20.0
 SURELY: Final = 100.0
 """Rooms by which the equation must be off on a throw that names a mistake without the others.
 
-How much nearer than its equation a mistake must be to be named as near where it is right on no throw.
+How much nearer than its equation a mistake must be, in the mean, to be named as near where it is right on no throw.
 """
 
 MAX_NAMED: Final = 2
@@ -459,12 +459,14 @@ def _explains(flown: Sequence[_Flown], change: Change) -> bool:
 def _is_near(distances: Sequence[float], without: Sequence[float]) -> bool:
     """Return whether a mistake is ``NEARER`` than its equation on every throw that tells, and right on one.
 
-    ``SURELY`` times nearer on all of them will do, too. Both by throw, in rooms.
+    ``SURELY`` times nearer in the geometric mean will do, too. Both by throw, in rooms.
     """
     pairs = list(zip(distances, without, strict=True))
-    told = [(distance, equation) for distance, equation in pairs if equation > FAR]
-    right = any(distance <= 1.0 for distance, _ in told) or all(d <= equation / SURELY for d, equation in told)
-    return right and all(distance <= max(1.0, equation / NEARER) for distance, equation in pairs)
+    if any(distance > max(1.0, equation / NEARER) for distance, equation in pairs):
+        return False
+    told = [(max(1.0, distance), equation) for distance, equation in pairs if equation > FAR]
+    nearer = float(np.mean([np.log(equation / distance) for distance, equation in told]))
+    return any(distance == 1.0 for distance, _ in told) or nearer >= np.log(SURELY)
 
 
 def _slow(flown: Sequence[_Flown], words: str, field: str, *units: str) -> Named | None:
