@@ -24,13 +24,12 @@ def ensemble(*members):
     return Ensemble.of(members, 1e-3)
 
 
-def test_the_width_is_that_of_all_members_and_has_its_rate_and_horizon():
-    growing = 1e-6 * np.exp(40 * np.minimum(T, 0.2))  # what comes after the horizon has no part in the rate
+def test_the_width_is_that_of_all_members_and_has_its_horizon():
+    growing = 1e-6 * np.exp(40 * np.minimum(T, 0.2))
     found = ensemble(flight(0.0), flight(growing), flight(-growing))
     assert found.width == pytest.approx(2 * growing, rel=1e-6, abs=0.0)
     assert found.change == pytest.approx(growing, rel=1e-6, abs=0.0)
     assert found.horizon == pytest.approx(math.log(1e-3 / 2e-6) / 40, abs=1e-4)
-    assert found.growth.rate == pytest.approx(40, rel=1e-3, abs=0.0)
     assert found.largest == found.width[-1] == pytest.approx(2e-6 * math.exp(8))
 
 
@@ -41,7 +40,6 @@ def test_members_on_the_same_side_do_not_widen_the_ensemble_twice():
 def test_an_ensemble_that_stays_together_has_no_horizon():
     found = ensemble(flight(0.0), flight(0.0))
     assert (found.horizon, found.largest, found.ended) == (None, 0.0, None)
-    assert "no growth rate" in found.growth.words
 
 
 def test_a_member_that_ends_is_a_horizon_and_not_a_cut():
@@ -51,7 +49,6 @@ def test_a_member_that_ends_is_a_horizon_and_not_a_cut():
     assert np.isinf(found.width[101:]).all()
     assert np.isinf(found.change[101:]).all()
     assert np.isinf(found.largest)
-    assert np.isfinite(found.growth.rate)
     both = ensemble(*(flight(0.0, points=101, status="diverged") for _ in range(2)))
     assert both.ended == pytest.approx(T[100])
 
@@ -68,7 +65,6 @@ def test_an_exponential_has_its_rate(rate):
     growth = fit_growth(T, 1e-6 * np.exp(rate * T))
     assert growth.rate == pytest.approx(rate, rel=1e-6, abs=0.0)
     assert growth.error < 1e-6
-    assert growth.words.startswith("grows" if rate > 0 else "shrinks")
 
 
 def test_sign_changes_and_single_jumps_do_not_spoil_the_rate():
@@ -84,7 +80,6 @@ def test_noise_rarely_has_a_clear_rate_and_its_error_is_honest():
     fits = [fit_growth(T, np.random.default_rng(seed).normal(size=len(T))) for seed in range(200)]
     assert sum(fit.clear for fit in fits) <= 20
     assert sum(abs(fit.rate) <= 2 * fit.error for fit in fits) >= 160
-    assert "no single rate of growth can be told" in next(fit.words for fit in fits if not fit.clear)
 
 
 @pytest.mark.parametrize("size", [np.zeros(1001), np.full(1001, math.nan), np.full(1001, 1e-16)])
@@ -92,4 +87,3 @@ def test_nothing_above_round_off_has_no_rate(size):
     growth = fit_growth(T, size)
     assert math.isnan(growth.rate)
     assert not growth.clear
-    assert "no growth rate" in growth.words

@@ -12,11 +12,11 @@ from engine_check.pymunk_settings import insertion_order
 from engine_check.pymunk_world import build
 from flipproof.build import ask_of
 from flipproof.chapters.horizon.chapter import (
-    OWN_SIZE,
+    OWN_SIZES,
     Reach,
-    claim_amplification,
     claim_angle,
     claim_horizon,
+    claim_release,
     claims,
     figure_horizon,
     figures,
@@ -89,26 +89,31 @@ def test_the_plan_changes_one_thing_at_a_time(reach):
 
 
 def test_the_own_throw_is_released_faster_and_slower():
-    (level,) = plan_own(OWN)
-    base, *others = (run.scenario for run in level.runs)
-    changes = [(at.theta0 - base.theta0, at.omega0 / base.omega0 - 1) for at in others]
-    assert np.abs(changes) == pytest.approx(OWN_SIZE, rel=1e-6, abs=0.0)
-    assert [tuple(np.sign(pair)) for pair in changes] == [(1, 1), (-1, -1)]
-    assert {run.settings.get("times") for run in level.runs} == {None}
+    for level, size in zip(plan_own(OWN), OWN_SIZES, strict=True):
+        base, *others = (run.scenario for run in level.runs)
+        changes = [(at.theta0 - base.theta0, at.omega0 / base.omega0 - 1) for at in others]
+        assert np.abs(changes) == pytest.approx(size, rel=1e-6, abs=0.0)
+        assert [tuple(np.sign(pair)) for pair in changes] == [(1, 1), (-1, -1)]
+        assert {run.settings.get("times") for run in level.runs} == {None}
 
 
-def test_the_amplification_is_the_largest_change_over_what_is_left_of_the_size():
+@pytest.mark.parametrize(
+    ("larger", "words"), [(4e-5, "500 times the change, and 400 times one of 1e-07"), (2e-6, "not in proportion")]
+)
+def test_another_release_of_the_own_throw_tells_whether_it_is_amplified_or_jumps(larger, words):
     levels = plan_own(OWN)
-    changes = (0.0, 3e-7, -5e-7)
+    changes = (0.0, 3e-7, -5e-7), (0.0, larger, -larger / 2)
     flights = {
         run: RunResult(run, trajectory_of(OWN.scenario, T, omega=20.0 * (1 + change)), 0.0)
-        for run, change in zip(levels[0].runs, changes, strict=True)
+        for level, sizes in zip(levels, changes, strict=True)
+        for run, change in zip(level.runs, sizes, strict=True)
     }
-    found = claim_amplification(study_horizon("free-flight", True, levels, Flights(flights)))
+    found = claim_release(study_horizon("free-flight", True, levels, Flights(flights)))
     assert found.id == "predictability-free-flight"
-    assert found.value == pytest.approx(500.0, rel=1e-5, abs=0.0)
+    assert found.value == pytest.approx(5e-7, rel=1e-5, abs=0.0)
+    assert words in found.note
     lost = flights | {levels[0].runs[1]: RunResult(levels[0].runs[1], None, 0.0, "MemoryError: too much")}
-    found = claim_amplification(study_horizon("free-flight", True, levels, Flights(lost)))
+    found = claim_release(study_horizon("free-flight", True, levels, Flights(lost)))
     assert (found.value, found.failed) == (None, False)
     assert "MemoryError" in found.note
 
@@ -170,7 +175,7 @@ def test_the_figure_labels_band_sizes_and_horizons():
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"change of 1e-09", "change of 1e-06", "band 0.001", "horizon"} == set(legend)
     (exhibit,) = figures(tuple(studies))
-    assert "beyond 0.001 from 69.1 ms" in exhibit.alt
+    assert "beyond 0.001 at 69.1 ms" in exhibit.alt
     assert "ω₀" not in exhibit.alt
     assert exhibit.drawing.png.startswith(b"\x89PNG")
 
@@ -235,4 +240,5 @@ def test_eq8_is_smooth_and_ice_amplifies_nothing():
         levels = plan_own(replace(OWN, solver=solver, scenario=throw, settings={}))
         study = study_horizon(solver, True, levels, Flights({run: make(run) for run in runs_of(levels)}))
         assert study.horizon is None
-        assert 0.999 < claim_amplification(study).value < most
+        assert 0.999 < claim_release(study).value / OWN_SIZES[0] < most
+        assert "times the change" in claim_release(study).note

@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from flipproof.curves.growth import Growth, first_crossing, fit_growth
+from flipproof.curves.growth import first_crossing
 from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Missing
 from slicemodel import Trajectory
@@ -73,12 +73,6 @@ class Ensemble:
     def horizon(self) -> float | None:
         """First time at which the width exceeds the band [s]; None: never."""
         return first_crossing(self.t, self.width, self.band)
-
-    @property
-    def growth(self) -> Growth:
-        """Growth of the width up to the horizon."""
-        horizon = self.horizon
-        return fit_growth(self.t, self.width, stop=math.inf if horizon is None else horizon)
 
 
 def difference(first: Trajectory, second: Trajectory) -> tuple[FloatArray, FloatArray]:

@@ -28,15 +28,6 @@ class Growth(NamedTuple):
         """
         return abs(self.rate) > 3.0 * self.error
 
-    @property
-    def words(self) -> str:
-        """The growth in words."""
-        if not math.isfinite(self.rate):
-            return "no growth rate (too few points above round-off)"
-        if not self.clear:
-            return f"no single rate of growth can be told ({self.rate:.1f} /s, standard error {self.error:.1f})"
-        return f"{'grows' if self.rate > 0 else 'shrinks'} at {abs(self.rate):.1f} /s (standard error {self.error:.1f})"
-
 
 def fit_growth(t: FloatArray, size: FloatArray, stop: float = math.inf) -> Growth:
     """Fit |difference| = A exp(rate t) up to ``stop``, robustly.

@@ -65,8 +65,9 @@ TERMS: Final[Mapping[str, str]] = {
     "band": "An estimate, not a bound, of how far a number could move by numerical causes alone: from eight flights "
     "whose release differs in the eleventh digit, or from finer settings.",
     "recoil": "The kick that the bottle gets when a slice strikes one of its ends.",
-    "certified": "Of an engine: the last halving of the step, twice the iterations and a slightly heavier or lighter "
-    "bottle move ω by no more than the tolerance, and a single slice rebounds as asked.",
+    "certified": "Of an engine: the last halving of the step and twice the iterations move ω by no more than the "
+    "tolerance, a slightly heavier or lighter bottle by no more than 1.5 times that, and a single slice rebounds as "
+    "asked. The band, not the tolerance, estimates the error.",
     "regression claim": "A statement that must hold in every report; if one fails, the report's exit status is 1.",
     "observation": "A reported number that never sets the exit status, such as whether an equation meets a "
     "statement of the paper.",

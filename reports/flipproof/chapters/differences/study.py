@@ -37,7 +37,7 @@ class Difference:
     t, omega : (P,) - times [s] and (omega_second - omega_first) / omega_0, signed
     largest, largest_time, final : max |omega| over time and when it is reached [s]; omega at the last common time
     parting_time : first time |omega| exceeds PARTING_BAND, interpolated [s]; None if it never does
-    parting_impact : last impact at or before the parting, in the run given for it
+    parting_impact, impacts_of : last impact at or before the parting, and the label of the run that has it
     band : numerical uncertainty of ``largest``: the sum of the two runs' own
     finer : another number of slices than ``slices``, and ``largest`` of the same two solvers at it
     """
@@ -52,6 +52,7 @@ class Difference:
     final: float
     parting_time: float | None
     parting_impact: Impact | None
+    impacts_of: str
     band: float | None
     slices: int
     finer: tuple[int, float] | None
@@ -64,7 +65,10 @@ class Difference:
         words = f"first differ by more than {percent(PARTING_BAND)} of ω₀ at t = {self.parting_time * 1e3:.1f} ms"
         if self.parting_impact is not None:
             impact = self.parting_impact
-            words += f", after slice {impact.slice} hit the {impact.end} at {impact.time * 1e3:.1f} ms"
+            words += (
+                f"; the last impact of {self.impacts_of} before that is of slice {impact.slice} on the {impact.end} at "
+                f"{impact.time * 1e3:.1f} ms"
+            )
         return words
 
 
@@ -100,6 +104,7 @@ def study_difference(
         final=float(omega[-1]),
         parting_time=parting,
         parting_impact=impacts[before - 1] if impacts is not None and before else None,
+        impacts_of="" if impacts_of is None else impacts_of.label,
         band=band,
         slices=first.scenario.n_slices,
         finer=None if finer is None else (finer[0].scenario.n_slices, study_difference(name, *finer).largest),

@@ -5,7 +5,7 @@
     order    bodies entered in another order: what the engine's own sweep leaves open
 
 Up to the horizon, where the width of an ensemble first leaves a band, one member stands for all. While a flight is
-smooth, its width grows in proportion to the change; an impact that one member has and another has not makes it jump
+smooth, its width is proportional to the change; an impact that one member has and another has not makes it jump
 instead, and then a smaller change does not help.
 """
 
@@ -41,8 +41,11 @@ BAND: Final = 1e-3
 OWN_THROW_SOLVERS: Final = ("eq8", FREE)
 """Equations whose flight of the report's own throw is released anew."""
 
-OWN_SIZE: Final = 1e-9
-"""Change of the release of the report's own throw: of theta_0 in rad and, at once, of omega_0 as a fraction."""
+OWN_SIZES: Final = (1e-9, 1e-7)
+"""Changes of the release of the report's own throw: of theta_0 in rad and, at once, of omega_0 as a fraction."""
+
+PROPORTIONAL: Final = 3.0
+"""Largest ratio of two amplifications by which a flight still amplifies small changes: beyond, it jumps."""
 
 LINES: Final = ("-", (0, (5, 2)), (0, (3, 1.5, 1, 1.5)), (0, (1, 1.5)))
 """Styles of the lines by size of the change."""
@@ -103,12 +106,12 @@ class Horizon:
 
 
 def words_of(level: Level, ensemble: Ensemble) -> str:
-    """Return width, horizon and growth of an ensemble in words."""
+    """Return width and horizon of an ensemble in words."""
     left, ended = ensemble.horizon, ensemble.ended
-    when = f"never beyond {BAND:g}" if left is None else f"beyond {BAND:g} from {left * 1e3:.1f} ms"
+    when = f"never beyond {BAND:g}" if left is None else f"first beyond {BAND:g} at {left * 1e3:.1f} ms"
     return (
         f"N = {level.runs[0].scenario.n_slices}, {level.variation}: width at most {ensemble.largest:.1e} of ω₀, "
-        f"{ensemble.width[-1]:.1e} at the end, {when}; {ensemble.growth.words}"
+        f"{ensemble.width[-1]:.1e} at the end, {when}"
         + ("" if ended is None else f"; a member ends at {ended * 1e3:.1f} ms")
     )
 
@@ -148,12 +151,13 @@ def plan_horizon(throw: Scenario, solver: str, reach: Reach) -> list[Level]:
 
 
 def plan_own(base: Run) -> list[Level]:
-    """Return the runs of the ensemble of a solver on the report's own throw."""
-    changed = [
-        Run(base.solver, released(base.scenario, by), base.settings, f"{base.name}, release changed by {by:+.0e}")
-        for by in (OWN_SIZE, -OWN_SIZE)
-    ]
-    return [Level("release", OWN_SIZE, [base, *changed])]
+    """Return the runs of the ensembles of a solver on the report's own throw."""
+
+    def changed(by: float) -> Run:
+        at = released(base.scenario, by)
+        return Run(base.solver, at, base.settings, f"{base.name}, release changed by {by:+.0e}")
+
+    return [Level("release", size, [base, changed(size), changed(-size)]) for size in OWN_SIZES]
 
 
 def study(ask: Ask) -> Study[tuple[Horizon, ...]]:
@@ -179,10 +183,10 @@ def study_horizon(solver: str, own_throw: bool, levels: Sequence[Level], flights
 
 
 def claims(results: tuple[Horizon, ...]) -> Claims:
-    """Yield the widest ensembles on the paper's throw, and by how much the report's own amplifies a small change."""
+    """Yield the widest ensembles on the paper's throw, and what another release changes of the report's own."""
     for horizon in results:
         if horizon.own_throw:
-            yield claim_amplification(horizon)
+            yield claim_release(horizon)
             continue
         yield claim_horizon(horizon)
         yield claim_angle(horizon)
@@ -197,7 +201,7 @@ def claim_horizon(study: Horizon) -> Finding:
     name, title = f"horizon-{study.solver}", f"{study.solver}: largest width of ω among flights that should be one"
     if widest is None:
         return observed(name, title, None, "of ω₀", "; ".join(study.problems))
-    when = "never left" if study.horizon is None else f"left from {study.horizon * 1e3:.1f} ms on"
+    when = "never left" if study.horizon is None else f"first left at {study.horizon * 1e3:.1f} ms"
     note = f"band {BAND:g} {when}; widest: {words_of(*widest)}"
     return observed(name, title, widest[1].largest, "of ω₀", note)
 
@@ -217,16 +221,22 @@ def claim_angle(study: Horizon) -> Finding:
     return regression(name, title, value, "of ω₀", (0.0, BAND / 1000), note)
 
 
-def claim_amplification(study: Horizon) -> Finding:
-    """How many times a small change of the release of the report's own throw is amplified."""
-    name, title = f"predictability-{study.solver}", f"{study.solver}: largest amplification of a change of the release"
-    if not study.ensembles:
-        return observed(name, title, None, note="; ".join(study.problems))
-    ((level, ensemble),) = study.ensembles
-    base, *changed = (run.scenario for run in level.runs)
-    # What is left of the change in the digits of theta_0 and omega_0.
-    sizes = [max(abs(at.theta0 - base.theta0), abs(at.omega0 / base.omega0 - 1)) for at in changed]
-    return observed(name, title, float(ensemble.change.max() / max(sizes)), note=words_of(level, ensemble))
+def claim_release(study: Horizon) -> Finding:
+    """How much a small change of the release changes the report's own throw, and whether in proportion."""
+    name = f"predictability-{study.solver}"
+    title = f"{study.solver}: largest change of ω by a change of the release of {OWN_SIZES[0]:.0e}"
+    if len(study.ensembles) < len(OWN_SIZES):
+        return observed(name, title, None, "of ω₀", "; ".join(study.problems))
+    changes = [float(ensemble.change.max()) for _, ensemble in study.ensembles]
+    times = [change / size for change, size in zip(changes, OWN_SIZES, strict=True)]
+    if max(times) <= PROPORTIONAL * min(times):
+        how = f"{times[0]:.3g} times the change, and {times[1]:.3g} times one of {OWN_SIZES[1]:.0e}"
+    else:
+        how = (
+            f"a change of {OWN_SIZES[1]:.0e} makes it {changes[1]:.1e}: not in proportion, because an impact happens "
+            "in some of the flights only"
+        )
+    return observed(name, title, changes[0], "of ω₀", f"{how}; {words_of(*study.ensembles[0])}")
 
 
 def figures(results: tuple[Horizon, ...]) -> Iterator[Exhibit]:
