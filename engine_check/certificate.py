@@ -277,10 +277,8 @@ def _observed_order(runs: Runs, at: Trial) -> tuple[float, str]:
         return math.nan, f"the change of {narrow:.1g} omega_0 is round-off"
     order = math.log2(wide / narrow) if wide > 0.0 else -math.inf
     if not ORDERS[0] <= order <= ORDERS[1]:
-        return math.nan, (
-            f"the changes of omega(t) by two halvings of the step, {wide:.2g} and {narrow:.2g} omega_0 in the mean, show "
-            "no order"
-        )
+        changes = f"{wide:.2g} and {narrow:.2g} omega_0 in the mean over time"
+        return math.nan, f"the changes of omega(t) by two halvings of the step, {changes}, show no order"
     return order, ""
 
 
