@@ -48,5 +48,13 @@ def test_the_worst_error_times_one_and_a_half_must_meet_the_tolerance_in_two_oct
     assert required_steps(SMALL, 1e-3) == 16 * 64 + 1
 
 
+def test_where_rounding_grows_one_octave_must_do_or_it_is_blamed(monkeypatch):
+    errors = {octave: 1 / octave if octave <= 2048 else 1e-3 * octave for octave in (2**k for k in range(20))}
+    monkeypatch.setattr("slicemodel.step_advice._worst_of_octave", lambda *ask: errors[ask[-1]])
+    assert required_steps(SMALL, 1.6 / 2048) == 2048 * 64 + 1
+    with pytest.raises(ValueError, match=r"error is 0\.00049 at 131072 steps, and rounding hides it on finer grids"):
+        required_steps(SMALL, 1.4 / 2048)
+
+
 def test_second_order_needs_fewer():
     assert required_steps(SMALL, 1e-3, "midpoint") * 4 <= required_steps(SMALL, 1e-3, "exact-step")
