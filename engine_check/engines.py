@@ -188,7 +188,7 @@ def _checked_step(dt: object, end: float) -> float:
     try:
         return checked_number("dt", dt, end / MAX_STEPS, math.inf, " s")
     except ValueError as error:
-        raise ValueError(f"{error}: a flight of {end:g} s has at most {MAX_STEPS:g} steps") from None
+        raise ValueError(f"{error}: an engine makes at most {MAX_STEPS:g} steps, here of {end:g} s in all") from None
 
 
 def _checked_iterations(iterations: object) -> int | None:

@@ -111,7 +111,10 @@ def _smaller_step(results: Mapping[str, RunResult]) -> tuple[float, str]:
             raise Missing(f"with {FEW_ITERATIONS} iterations and dt = {dt:g} s nothing explodes")
         held.append(float(run.t[-1]))
     long, short = held
-    note = f"holds for {long * 1e3:g} ms at Δt = {LONG_DT:g} s, for {short * 1e3:g} ms at {SHORT_DT:g} s"
+    note = (
+        f"last output before it breaks: {long * 1e3:g} ms at Δt = {LONG_DT:g} s, {short * 1e3:g} ms at {SHORT_DT:g} s; "
+        "an output every millisecond"
+    )
     return (short / long if long else math.nan), note
 
 

@@ -244,7 +244,7 @@ def figures(results: Orders) -> Iterator[Exhibit]:
         maker=figure_step_size,
         data=(studies, starts),
         table=rows_csv(
-            ("part of the flight", "scheme", "held against", "mean dt [s]", "mean error [of omega_0]",
+            ("part of the flight", "scheme", "held against", "mean dt [s]", "rms error [of omega_0]",
              "least error [of omega_0]", "largest error [of omega_0]", "fitted order [1]", "its standard error [1]"),
             (
                 (part, curve.scheme, curve.model, dt, mean, errors.min(), errors.max(), curve.order, curve.order_error)
