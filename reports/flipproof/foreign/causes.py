@@ -15,6 +15,11 @@ from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass
 from slicemodel.trajectory import FloatArray
 
+OFF_MOMENTUM: Final = 1e-4
+"""Departure of omega from constant angular momentum between two outputs that is no error of a step."""
+
+STALE_OMEGA: Final = "omega is not J_0 omega_0 / J of the places answered with it: answer the omega of the same instant"
+
 
 def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = False) -> str:
     """Return why a solver departs in these intervals, as a phrase; empty if that is not known.
@@ -39,11 +44,12 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
             return _impact_cause(intervals, recoil=recoil) or _place_cause(intervals)
         throws = _by_throw(intervals)  # a factor may depend on the mass of a slice
         return (
-            _inertia_cause(throws[0])
+            _place_cause(intervals)
+            or _inertia_cause(throws[0])
             or _advance_cause(throws[0])
             or next(filter(None, (_motion_cause(some, seldom=seldom) for some in (intervals, *throws))), "")
-            or _place_cause(intervals)
             or _slice_cause(intervals)
+            or (STALE_OMEGA if np.median([i.departure["omega"] for i in intervals]) > OFF_MOMENTUM else "")
         )
     return ""
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipproof.foreign import elsewhere
-from flipproof.foreign.causes import parts_of_inertia, rms
+from flipproof.foreign.causes import STALE_OMEGA, parts_of_inertia, rms
 from flipproof.foreign.checking import (
     CALM,
     SMOOTH,
@@ -491,7 +491,7 @@ def _lag_advice(ask: Ask, answer: Answer) -> str:
     """Return that omega belongs to another instant, if it does not follow from the places answered with it."""
     if answer.r is None or float(_drift(ask, answer).max()) < 1e-5:
         return ""
-    return "omega is not J_0 omega_0 / J of the places answered with it: answer the omega of the same instant; "
+    return f"{STALE_OMEGA}; "
 
 
 def _jump_advice(times: FloatArray, omega: FloatArray) -> str:

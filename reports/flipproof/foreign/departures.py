@@ -127,6 +127,9 @@ OF_FORCES: Final = ("weight", "drag", "no weight", "no drag")
 LOW: Final = 0.03
 """Speed of an impact that may be overlooked in a long step [L omega_0]."""
 
+MANY: Final = 10
+"""Impacts of a throw from which on a limit on their number is thought of."""
+
 FEW: Final = 3
 """Fewest departing intervals that are reported: rounding may move one impact to the other side of an output."""
 
@@ -159,13 +162,10 @@ def departing(traits: Traits, equation: str, asks: Sequence[Ask], crowded: Seque
     departure = yield from _departing(traits, equation, asks)
     if not departure[0]:
         with suppress(ForeignError):
-            if overlooked := _overlooked((yield from _intervals_at(traits, equation, [*asks, *crowded], LONG))):
+            where, advice = _overlooked((yield from _intervals_at(traits, equation, [*asks, *crowded], LONG)))
+            if where:
                 effort = effort_of(traits, asks[0].scenario, LONG)
-                return (
-                    f"{overlooked} at {traits.refined_by} = {effort:.2g}",
-                    "impacts in a part of a long step are overlooked: look at where in a step they are searched for, "
-                    "and whether the earliest of several comes first",
-                )
+                return f"{where} at {traits.refined_by} = {effort:.2g}", advice
     return departure
 
 
@@ -297,8 +297,8 @@ def _same_share(lone: Sequence[Interval], delays: FloatArray) -> bool:
     return bool(high - low < 0.2 * median)
 
 
-def _overlooked(intervals: Sequence[Interval]) -> str:
-    """Return at how many impacts a solver departs that locates most of them exactly.
+def _overlooked(intervals: Sequence[Interval]) -> tuple[str, str]:
+    """Return at how many impacts a solver departs that locates most of them exactly, and what to look at.
 
     The low bounces of a slice that comes to rest may be lost in a long step.
     """
@@ -306,8 +306,21 @@ def _overlooked(intervals: Sequence[Interval]) -> str:
     sizes = np.array([interval.size for interval in struck])
     count = int(np.sum(sizes > OVERLOOKED))
     if count < FEW or np.median(sizes) > EXACT:
-        return ""
-    return f"in {count} of {len(sizes)} intervals with an impact"
+        return "", ""
+    before = np.array([sum(len(o.hits) for o in intervals if _precedes(o, i)) for i in struck])
+    fewest = int(before[sizes > OVERLOOKED].min())
+    if fewest >= MANY and np.mean(sizes[before > fewest] > OVERLOOKED) > SURE:
+        advice = f"all are right until {fewest} impacts of a throw are over: look for a limit on their number"
+    else:
+        advice = (
+            "impacts in a part of a long step are overlooked: look at where in a step they are searched for, and "
+            "whether the earliest of several comes first"
+        )
+    return f"in {count} of {len(sizes)} intervals with an impact", advice
+
+
+def _precedes(first: Interval, second: Interval) -> bool:
+    return first.number == second.number and first.time < second.time
 
 
 def _passed_over(traits: Traits, coarse: Sequence[Interval], fine: Sequence[Interval]) -> str:
