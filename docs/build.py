@@ -41,11 +41,12 @@ STYLE = """
  :root { --ink: #e6edf3; --paper: #0d1117; --line: #3d444d; --link: #79b8ff; --panel: #161b22 }
 }
 body { margin: 0; background: var(--paper); color: var(--ink); font: 16px/1.55 system-ui, sans-serif; }
-.all { max-width: 78rem; margin: 0 auto; display: grid; gap: 2rem; padding: 1rem; }
+.all { max-width: 78rem; margin: 0 auto; padding: 1rem; display: grid; gap: 2rem; }
+.all { grid-template-columns: minmax(0, 1fr); }
 @media (min-width: 60rem) { .all { grid-template-columns: 13rem minmax(0, 1fr); } }
 nav ul { list-style: none; padding: 0; } a { color: var(--link); } [aria-current] { font-weight: 700; }
 pre, .formula { background: var(--panel); border: 1px solid var(--line); border-radius: 6px; padding: .7rem; }
-pre, .formula, table { overflow-x: auto; }
+pre, .formula, table { overflow-x: auto; } main { overflow-wrap: break-word; }
 .formula { font: 1.08rem/1.5 "STIX Two Math", Cambria, Georgia, serif; white-space: pre; }
 table { border-collapse: collapse; display: block; }
 th, td { border-bottom: 1px solid var(--line); padding: .3rem .8rem .3rem 0; text-align: left; vertical-align: top; }
@@ -87,7 +88,8 @@ def page_of(path: Path, current: str, *, report: bool, lesson: bool) -> str:
         r"\]\((?:docs/)?([\w-]+)\.md(#[\w-]+)?\)", lambda match: f"]({match.group(1)}.html{match.group(2) or ''})", text
     )
     text = re.sub(r"^```(\w+) file=.*$", r"```\1", text, flags=re.MULTILINE)  # which markdown2 takes for no block
-    body = str(markdown2.markdown(text, extras=["tables", "fenced-code-blocks", "header-ids"]))
+    # "code-friendly": an underscore is part of a name or a formula, and only asterisks are emphasis.
+    body = str(markdown2.markdown(text, extras=["tables", "fenced-code-blocks", "header-ids", "code-friendly"]))
     body = re.sub(r"<pre><code>(.*?)</code></pre>", lambda match: _block(match.group(1)), body, flags=re.DOTALL)
     return site_page(PAGES[current], body, current, report=report, lesson=lesson)
 

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 
 PACKAGES = ("slicemodel", "ode_reference", "engine_check")
-MODULES = (*PACKAGES, "slicemodel.observables", "slicemodel.schemes", "ode_reference.closed_forms")
+MODULES = (*PACKAGES, "slicemodel.observables", "slicemodel.schemes", "ode_reference.closed_forms", "flipproof.testing")
 
 
 def build(out: Path) -> None:

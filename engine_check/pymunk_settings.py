@@ -146,8 +146,11 @@ class PymunkKnobs:
     def __post_init__(self) -> None:
         checks = _Checks()
         for name, (minimum, maximum) in _RANGES.items():
-            if not (getattr(self, name) is None and name in _MAY_BE_LEFT_OUT):
-                checks.number(name, getattr(self, name), "", minimum=minimum, maximum=maximum)
+            value = getattr(self, name)
+            if name in _WHOLE:
+                checks.whole(name, value, minimum=int(minimum), maximum=int(maximum))
+            elif not (value is None and name in _MAY_BE_LEFT_OUT):
+                checks.number(name, value, "", minimum=minimum, maximum=maximum)
         checks.refuse()
 
     @classmethod
@@ -179,4 +182,5 @@ _RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "grid_offset": (0.0, 0.5),
 }
 
+_WHOLE: Final = ("collision_persistence", "shuffle")
 _MAY_BE_LEFT_OUT: Final = ("slice_restitution",)

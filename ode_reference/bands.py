@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ode_reference.combinations import require_own_switches
 from ode_reference.solver import MIN_REST_SPEED, TAYLOR, model_named, solve
-from slicemodel.scenario import not_whole
+from slicemodel.scenario import not_whole, refuse_other
 from slicemodel.trajectory import FloatArray, Trajectory
 
 TWINS: Final = 8
@@ -83,13 +83,14 @@ def estimate_band(flight: Trajectory, *, twins: int = TWINS) -> Band:
     Raises
     ------
     ValueError
-        Naming the solver if it is not ``ode_reference``, or the column, which has no impacts to enlarge a change; or
-        ``twins``.
+        Naming ``flight`` if it is no Trajectory; the solver if it is not ``ode_reference``, or the column, which has no
+        impacts to enlarge a change; or ``twins``.
 
     Accuracy
     --------
     ``python benchmarks/last_digits.py`` prints how many further twins of random throws lie within the band.
     """
+    refuse_other("flight", flight, Trajectory)
     settings = flight.settings
     if flight.solver != "ode_reference" or "rest_speed" not in settings:
         raise ValueError(f"{flight.solver} {flight.method}: only flights of slices by ode_reference.solve have twins")

@@ -15,6 +15,8 @@ from dataclasses import astuple, dataclass
 from itertools import product
 from typing import Final, TypeGuard
 
+from slicemodel.scenario import true_or_false
+
 PREFIX: Final = "switches:"
 
 
@@ -39,6 +41,11 @@ class Switches:
     weightless : bool - no weight along the axis. Off: k^2 g cos(theta) / omega^2.
     origin : bool - the origin accelerates: slices move relative to a tube that forces move.
     recoil : bool - an impact moves the tube. Off: every rebound is that of an immovable tube.
+
+    Raises
+    ------
+    ValueError
+        Naming the first field that is neither True nor False.
     """
 
     signs: bool = False
@@ -47,6 +54,10 @@ class Switches:
     weightless: bool = False
     origin: bool = False
     recoil: bool = False
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            object.__setattr__(self, name, true_or_false(name, getattr(self, name)))
 
     @property
     def name(self) -> str:
@@ -62,8 +73,8 @@ class Switches:
         ValueError
             If ``name`` is not "switches:" and six digits 0 or 1.
         """
-        digits = name.removeprefix(PREFIX)
-        if not are_switches(name) or len(digits) != len(cls.__slots__) or set(digits) - {"0", "1"}:
+        digits = name.removeprefix(PREFIX) if are_switches(name) else ""
+        if len(digits) != len(cls.__slots__) or set(digits) - {"0", "1"}:
             raise ValueError(
                 f"model = {name!r} is no set of switches: write {PREFIX!r} and one digit 0 or 1 for each of "
                 f"{', '.join(cls.__slots__)}, such as {cls(True, True).name!r}"

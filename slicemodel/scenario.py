@@ -112,6 +112,17 @@ class _Checks:
             return None
         return int(value)  # type: ignore[call-overload, no-any-return]
 
+    def pair(self, name: str, value: object, unit: str, *, maximum: float) -> tuple[float | None, ...]:
+        """Return ``value`` as (x, y) if it is a pair of numbers in [-maximum, maximum], else note why not."""
+        parts = () if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+        if len(parts) != 2:
+            self.problems.append(f"{self.where}{name} = {shown(value)} is not a pair (x, y) of numbers in {unit}")
+            return ()
+        return tuple(
+            self.number(f"{name}.{axis}", part, unit, minimum=-maximum, maximum=maximum)
+            for axis, part in zip("xy", parts, strict=True)
+        )
+
     def refuse(self) -> None:
         """Raise one ScenarioError that states all problems, if there are any."""
         if self.problems:
@@ -296,7 +307,7 @@ class Scenario:
             "theta0": self._checked_angle(checks),
             "duration": checks.number("duration", self.duration, "s", minimum=MIN_VALUE, maximum=MAX_VALUE),
             "gravity": checks.number("gravity", self.gravity, "m/s^2", minimum=0.0, maximum=MAX_VALUE),
-            "launch_velocity": self._checked_launch_velocity(checks),
+            "launch_velocity": checks.pair("launch_velocity", self.launch_velocity, "m/s", maximum=MAX_VALUE),
         }
         if isinstance(omega0 := checked["omega0"], float) and abs(omega0) < MIN_VALUE:
             checks.problems.append(
@@ -323,16 +334,6 @@ class Scenario:
         if angle is None and isinstance(self.theta0, int | float) and MAX_ANGLE < abs(self.theta0) <= 1e6:
             checks.problems[-1] += f"; radians? {self.theta0:g} degrees are {math.radians(self.theta0):.6g} rad"
         return angle
-
-    def _checked_launch_velocity(self, checks: _Checks) -> tuple[float | None, ...]:
-        components = self.launch_velocity
-        if isinstance(components, str) or not isinstance(components, Iterable) or len(tuple(components)) != 2:
-            checks.problems.append(f"launch_velocity = {shown(components)} is not a pair (v_x, v_y) of numbers in m/s")
-            return ()
-        return tuple(
-            checks.number(f"launch_velocity.{axis}", component, "m/s", minimum=-MAX_VALUE, maximum=MAX_VALUE)
-            for axis, component in zip("xy", components, strict=True)
-        )
 
     # ------------------------------------------------------------------ derived geometry
 
@@ -410,6 +411,8 @@ class Scenario:
     @classmethod
     def from_mapping(cls, document: Mapping[str, Any], *, source: str = "scenario") -> Scenario:
         """Build a scenario from ``{"scenario": {...}, "bottle": {...}}``; errors name ``source``."""
+        if not isinstance(document, Mapping):
+            raise ScenarioError(f"{source}: {shown(document)} is not a mapping of the tables scenario and bottle")
         if problem := stray_key(document, ("scenario", "bottle")):
             raise ScenarioError(f"{source}: {problem}")
         _refuse_unknown(document, ("scenario", "bottle"), f"{source}: table")

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from slicemodel.scenario import Scenario, ScenarioError, _Checks, unknown_name
+from slicemodel.scenario import Scenario, ScenarioError, _Checks, shown, unknown_name
 from slicemodel.trajectory import FloatArray
 
 MAX_VALUE: Final = 1e15
@@ -122,21 +122,11 @@ class Touch:
             "theta": checks.number("theta", self.theta, "rad", minimum=-MAX_VALUE, maximum=MAX_VALUE),
             "omega": checks.number("omega", self.omega, "rad/s", minimum=-MAX_VALUE, maximum=MAX_VALUE),
             "time": checks.number("time", self.time, "s", minimum=-MAX_VALUE, maximum=MAX_VALUE),
-            "velocity": tuple(
-                checks.number(f"velocity.{axis}", part, "m/s", minimum=-MAX_VALUE, maximum=MAX_VALUE)
-                for axis, part in zip("xy", self.velocity, strict=True)
-            ),
+            "velocity": checks.pair("velocity", self.velocity, "m/s", maximum=MAX_VALUE),
         }
         checks.number("scenario.gravity", self.scenario.gravity, "m/s^2", minimum=1.0 / MAX_VALUE, maximum=MAX_VALUE)
-        arrays = {name: np.array(getattr(self, name), dtype=np.float64) for name in ("r", "v")}
-        n, length = self.scenario.n_slices, self.scenario.bottle.length
-        for name, values in arrays.items():
-            if values.shape != (n,):
-                checks.problems.append(f"touch.{name} has shape {values.shape}, not {(n,)}")
-            elif not np.isfinite(values).all():
-                k = int(np.flatnonzero(~np.isfinite(values))[0])
-                checks.problems.append(f"touch.{name}[{k}] = {values[k]!r} is not finite")
-            values.setflags(write=False)
+        length = self.scenario.bottle.length
+        arrays = {name: _each_slice(checks, name, getattr(self, name), self.scenario.n_slices) for name in ("r", "v")}
         if not checks.problems:
             outside = np.flatnonzero((arrays["r"] < 0.0) | (arrays["r"] > length))
             for k in outside[:1].tolist():
@@ -169,6 +159,22 @@ class Touch:
             )
             for spin, speed, tilt in ((1, 0, 1), (-1, 0, -1), (0, 1, -1), (0, -1, 1))
         )
+
+
+def _each_slice(checks: _Checks, name: str, value: object, n: int) -> FloatArray:
+    """Return ``value`` as a read-only array of ``n`` finite numbers, else note why not."""
+    try:
+        values = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        checks.problems.append(f"{checks.where}{name} = {shown(value)} is not an array of numbers")
+        return np.zeros(n)
+    if values.shape != (n,):
+        checks.problems.append(f"{checks.where}{name} has shape {values.shape}, not {(n,)}")
+    elif not np.isfinite(values).all():
+        k = int(np.flatnonzero(~np.isfinite(values))[0])
+        checks.problems.append(f"{checks.where}{name}[{k}] = {values[k]!r} is not finite")
+    values.setflags(write=False)
+    return values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+import engine_check
+import flipproof.testing
+import ode_reference
 import slicemodel
 from flipproof.cli.main import parser
 from slicemodel import Scenario
@@ -86,24 +89,45 @@ def test_the_list_of_every_command_lacks_none():
     assert [name for name in subcommands() if f"flipproof {name}" not in text] == []
 
 
-def test_the_site_is_built_by_one_command_and_its_links_lead_somewhere(tmp_path):
-    """With the reference, which a warning would end."""
-    command = [sys.executable, str(ROOT / "docs" / "build.py"), "--out", str(tmp_path)]
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the site, with the reference, which a warning would end."""
+    out = tmp_path_factory.mktemp("site")
+    command = [sys.executable, str(ROOT / "docs" / "build.py"), "--out", str(out)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    pages = list(tmp_path.glob("*.html"))
+    return out
+
+
+def test_the_links_of_the_site_lead_somewhere(site):
+    pages = list(site.glob("*.html"))
     assert {path.stem for path in pages} >= {Path(page).stem for page in PAGES if page.startswith("docs/")}
     for path in pages:
         text = path.read_text(encoding="utf-8")
         assert not re.search(r'src="https?:|href="https?:', text)
         for target in re.findall(r'(?:href|src)="([^"#]+)"', text):
-            assert (tmp_path / target).exists(), f"{path.name}: {target}"
-    assert "ω<sup>2</sup>" in (tmp_path / "theory.html").read_text(encoding="utf-8")
-    own = (tmp_path / "own-solver.html").read_text(encoding="utf-8")
+            assert (site / target).exists(), f"{path.name}: {target}"
+    assert "ω<sup>2</sup>" in (site / "theory.html").read_text(encoding="utf-8")
+    own = (site / "own-solver.html").read_text(encoding="utf-8")
     assert "file=mine.py" not in own
     assert re.search("<h2[^>]*>2. Ask which equation it solves</h2>", own)
-    page = (tmp_path / "reference" / "slicemodel.html").read_text(encoding="utf-8")
-    assert all(f'id="{name}"' in page for name in slicemodel.__all__)
+
+
+@pytest.mark.parametrize("page", [page for page in (*PAGES, "CONTRIBUTING.md") if "vectors" not in page])
+def test_the_site_keeps_every_underscore_of_a_formula(site, page):
+    """As an underscore of the text, or typeset as a subscript."""
+    elsewhere = r"!\[[^]]*\]|\]\([^)]*\)|^```.*$|<!--[^>]*-->"  # in an attribute, or left out
+    written = re.sub(elsewhere, "", (ROOT / page).read_text(encoding="utf-8"), flags=re.MULTILINE)
+    body = (site / f"{Path(page).stem}.html").read_text(encoding="utf-8").split("<main>")[1]
+    shown = re.sub(r"<[^>]*>", "", body.replace("<sub>", "_"))
+    assert shown.count("_") == written.count("_")
+
+
+def test_the_reference_has_every_public_name(site):
+    for package in (slicemodel, ode_reference, engine_check, flipproof.testing):
+        page = site / "reference" / f"{package.__name__.replace('.', '/')}.html"
+        text = page.read_text(encoding="utf-8")
+        assert [name for name in package.__all__ if f'id="{name}"' not in text] == []
 
 
 def test_the_example_is_the_default_throw():

@@ -55,7 +55,7 @@ def solve(problem, tolerance, solver="Dopri8"):
             for i in np.flatnonzero((rests == 0) & (end * (ends[end] - r) <= TOUCH) & (end * v > 0)):
                 after = p["restitution"] * abs(v[i])
                 slow = after < p["rest_speed"] and push(y, end) >= 0
-                impacts.append((float(t), i, end, abs(v[i]), after))
+                impacts.append((float(t), i, end, abs(v[i]), 0.0 if slow else after))
                 r[i], v[i], rests[i] = (ends[end], 0.0, end) if slow else (inside[end], -end * after, 0)
     return impacts, omegas
 

@@ -62,7 +62,7 @@ def solve(problem, tolerance):
         for i in np.flatnonzero((rests == 0) & (end * (ends[end] - place) <= TOUCH) & (end * speed > 0)):
             after = p["restitution"] * abs(speed[i])
             slow = after < p["rest_speed"] and push(end) >= 0
-            impacts.append((flight.time, i, end, abs(speed[i]), after))
+            impacts.append((flight.time, i, end, abs(speed[i]), 0.0 if slow else after))
             place[i], speed[i] = (ends[end], 0.0) if slow else (inside[end], -end * after)
             rests[i] = end if slow else 0
         flight.pars[:] = rests == 0

@@ -81,6 +81,6 @@ def solve(problem, tolerance, method="DOP853", turns=True):
             for i in np.flatnonzero((rests == 0) & (room(y, end) <= TOUCH) & (end * v > 0)):
                 after = p["restitution"] * abs(v[i])
                 slow = after < p["rest_speed"] and push(y, end) >= 0
-                impacts.append((t, i, end, abs(v[i]), after))
+                impacts.append((t, i, end, abs(v[i]), 0.0 if slow else after))
                 r[i], v[i], rests[i] = (ends[end], 0.0, end) if slow else (inside[end], -end * after, 0)
     return impacts, omegas

@@ -20,6 +20,9 @@ from typing import Any
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, WAITING, certify
 from flipproof.foreign.contract import Runner
 from flipproof.foreign.solving import opened
+from slicemodel.scenario import known_name
+
+__all__ = ["assert_curves_agree", "assert_ice_constant", "parametrize_with_checks"]
 
 
 def _check(name: str, runner: Callable[[], Runner]) -> None:
@@ -41,11 +44,18 @@ def parametrize_with_checks(spec: str, checks: Iterable[str] = tuple(CHECKS)) ->
     ----------
     spec : str - as at the command line (``flipproof.foreign.specs``)
     checks : iterable of str - names in ``flipproof.foreign.certify.CHECKS``
+
+    Raises
+    ------
+    ValueError
+        If a check is unknown, with the nearest name.
     """
     import pytest
 
+    names = [known_name("check", name, CHECKS) for name in checks]
+
     runner = functools.cache(lambda: opened(spec))
-    tests = {name: functools.partial(_check, name, runner) for name in checks}
+    tests = {name: functools.partial(_check, name, runner) for name in names}
     return pytest.mark.parametrize("check", tests.values(), ids=tests.keys())
 
 

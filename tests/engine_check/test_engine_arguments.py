@@ -45,6 +45,11 @@ EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
         ({"error_bias": math.nan}, r"error_bias = .* is outside \[0"),
         ({"damping": 2.0}, r"damping = .* is outside \[0"),
         *(({knob: "a"}, rf"{knob} = 'a' is not a number \(admissible: \[0, ") for knob in ("friction", "damping")),
+        *(
+            ({knob: wrong}, rf"{knob} = .* is not a whole number in \[")
+            for knob in ("shuffle", "collision_persistence")
+            for wrong in (1.5, True, "a", -1)
+        ),
         ({"cap_thickness": math.nan}, "cap_thickness = nan is outside"),
         ({"slice_restitution": 0.3}, r"slice_restitution = 0\.3 has no effect where slices = 'overlap'"),
         *(

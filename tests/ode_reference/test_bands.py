@@ -164,6 +164,9 @@ def test_a_flight_without_twins_is_refused():
     for flight in (ode_reference.solve(THROW, "column"), slicemodel.solve(THROW, steps=100)):
         with pytest.raises(ValueError, match="ode_reference"):
             estimate_band(flight)
+    for flight in (None, "eq8"):
+        with pytest.raises(ValueError, match=rf"flight = {flight!r} is not a slicemodel\.Trajectory"):
+            estimate_band(flight)
     with pytest.raises(ValueError, match="twins"):
         estimate_band(ode_reference.solve(THROW, "eq8"), twins=0)
 

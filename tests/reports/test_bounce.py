@@ -211,6 +211,11 @@ MISTAKES = {
         "rest",
         "still moves, by up to 6 mm/s",
     ),
+    "without its last row": (
+        answered(lambda *flight: tuple(column[:-1] for column in flight)),
+        "contract",
+        "a row too few",
+    ),
     "three decimals": (answered(lambda t, y, v: (t, np.round(y, 3), np.round(v, 3))), "precision", "have 3 decimals"),
 }
 
@@ -373,12 +378,12 @@ def test_bodies_in_line():
         return in_line(masses, positions, [0.0, 0.0, 0.0] if near else asked[0], *asked[1:])
 
     for line, name, words in (
-        (once_a_step, "three in line", "with 0.000, 0.000, 0.000 m/s"),
+        (once_a_step, "three in line", "a cradle of three ends with 0.000, 0.000, 0.000 m/s, not 0, 0, 1"),
         (without_masses, "pairs", "masses 1 : 1000, e = 1)"),
         (immovable, "pairs", "off by 0.002 m/s"),
         (apart, "pairs", "touching at t = 0"),
         (from_the_left, "pairs", "hit from the right"),
-        (together, "three in line", "all move on"),
+        (together, "three in line", "ends with 0.333, 0.333, 0.333 m/s, not 0, 0, 1"),
         (leaning, "one instant", "differ by 0.002 m/s"),
     ):
         assert words in LINE_MEASURES[name](Adapter("line", located, line), 1e-3).remark

@@ -100,6 +100,16 @@ def test_no_bottle_is_impossible(field, value):
         Bottle(**{field: value})
 
 
+@pytest.mark.parametrize("document", ["x", 5, None, [("scenario", {})]])
+def test_what_is_no_mapping_is_refused_by_its_source(document):
+    with pytest.raises(ScenarioError, match=r"^here: .* is not a mapping of the tables"):
+        Scenario.from_mapping(document, source="here")
+
+
+def test_a_launch_velocity_may_come_from_a_generator():
+    assert Scenario(launch_velocity=(part for part in (1, 2))).launch_velocity == (1.0, 2.0)
+
+
 def test_all_problems_are_told_at_once():
     with pytest.raises(ScenarioError) as refusal:
         Scenario(water_mass=math.nan, n_slices=0, restitution=7)

@@ -58,6 +58,16 @@ def good(**changes):
     [
         ({"theta": math.nan}, "touch.theta = nan rad"),
         ({"velocity": (math.inf, 0.0)}, "touch.velocity.x = inf m/s"),
+        *(
+            ({"velocity": wrong}, "touch.velocity = .* is not a pair .* of numbers in m/s")
+            for wrong in ((1,), 1.0, "12", None, (1, 2, 3))
+        ),
+        *(
+            ({name: wrong}, rf"touch.{name} = .* is not an array of numbers")
+            for name in ("r", "v")
+            for wrong in ("abcd", ["a"] * 20, [[1.0], [1.0, 2.0]], {})
+        ),
+        ({"velocity": (1,), "v": "abcd"}, "touch.velocity = .*; touch.v = "),
         ({"r": np.zeros(3)}, r"touch.r has shape \(3,\), not \(20,\)"),
         ({"v": np.full(20, math.nan)}, r"touch.v\[0\] = .*nan.* is not finite"),
         ({"r": np.full(20, 0.3)}, r"touch.r\[0\] = 0.3 m is outside \[0, 0.28\]"),

@@ -20,7 +20,7 @@ from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
 from slicemodel import Scenario
-from slicemodel.scenario import unknown_name
+from slicemodel.scenario import known_name, unknown_name
 
 PASSED: Final = "passed"
 WEAK: Final = "weak"
@@ -225,16 +225,18 @@ def certify(
 
     It is tested against ``equation``, if given, instead of the one that it declares; ``seed`` draws the throws of
     "elsewhere"; with ``until_failed`` the first failure is the last check; ``say`` is called with each result. Raises
-    ForeignError if the solver cannot be loaded or declares the failure of a check that does not exist.
+    ForeignError if the solver cannot be loaded or declares the failure of a check that does not exist, ValueError if
+    ``checks`` names one.
     """
+    suite: dict[str, Check] = {**CHECKS, "elsewhere": partial(elsewhere.check_elsewhere, seed=seed)}
+    names = tuple(known_name("check", name, suite) for name in checks)
     declared = runner.traits if equation is None else replace(runner.traits, equation=equation)
     traits = declared
     for name in traits.expected_failures:
         if name not in CHECKS:
             raise ForeignError(unknown_name("expected_failures: check", name, CHECKS))
-    recorder, names = _Recorder(runner), tuple(checks)
+    recorder = _Recorder(runner)
     results: list[Result] = []
-    suite: dict[str, Check] = {**CHECKS, "elsewhere": partial(elsewhere.check_elsewhere, seed=seed)}
     for name in names:
         result = _result(name, suite[name], traits, recorder)
         if result.verdict == FAILED and result.observation is None:

@@ -42,6 +42,7 @@ from flipproof.foreign.place import name_of, switches_of
 from flipproof.foreign.solving import opened
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
+from flipproof.testing import parametrize_with_checks
 from slicemodel import Scenario
 from slicemodel.observables import moment_of_inertia
 
@@ -1014,3 +1015,11 @@ def test_a_bug_in_what_is_planted_is_no_failure_of_a_check():
 
     with pytest.raises(KeyError, match="omega"):
         certify(InProcess(Broken(), "broken"), ["shape"])
+
+
+@pytest.mark.parametrize("checks", [["shap"], ["shape", "shap"], [5]])
+def test_an_unknown_check_is_refused_before_any_is_made(checks):
+    with pytest.raises(ValueError, match=r"^check = .* is unknown; "):
+        parametrize_with_checks("nothing.py:solve", checks)
+    with pytest.raises(ValueError, match=r"^check = .* is unknown; "):
+        certify(None, checks)
