@@ -185,6 +185,9 @@ def estimate(
         If the film has too few values, or no flight in it (``NoFlightError``), or the solver cannot be fitted.
     """
     held = held or Held()
+    _check_times(film, held)
+    if film.quantity == "omega":
+        held = replace(held, theta0=throw.theta0)
     sliced = throw.with_slices(slices or min(throw.n_slices, SLICES))
     starts = _first_guesses(thinned(film), sliced, held)
 
@@ -196,6 +199,17 @@ def estimate(
     second = _estimate_from(film, sliced, solver, held, plausible, seconds, tick)
     accepted = _gravity_plausible(second.fit.x) and second.best["noise"] < 2.0 * film.scatter()
     return replace(second, first_guess_cost=plausible[0][0]) if accepted else first
+
+
+def _check_times(film: Film, held: Held) -> None:
+    """Refuse a release or a touch that is far outside the film."""
+    first, last = float(film.t[0]), float(film.t[-1])
+    bounds = ("--release", held.release, 2 * first - last, last), ("--landing", held.touch, first, 2 * last - first)
+    for option, value, low, high in bounds:
+        if value is not None and not low <= value <= high:
+            raise ValueError(
+                f"{film.label}: {option} {value:g} s is no time of this film, which runs from {first:g} to {last:g} s"
+            )
 
 
 def _gravity_plausible(x: FloatArray) -> bool:
@@ -228,7 +242,8 @@ def _estimate_from(
         x = np.insert(x, -2, np.zeros(3 * (MOTIONS - 1)))
     likelihood, grid, complete = _adaptive_grid(likelihood, equation, x, seconds)
     if not np.isfinite(grid.log_masses).any():
-        raise NoFlightError(f"{film.label}: {solver}: no flight fits the clicks; check that y points up")
+        advice = "fits the clicks; check that y points up" if likelihood.planar else "fits; fit another equation"
+        raise NoFlightError(f"{film.label}: {solver}: no flight {advice}")
     rugged = is_sharp(grid)
     if complete:
         grid = _refine(likelihood, equation, grid, start_time + seconds)
@@ -593,7 +608,9 @@ def _first_guesses(film: Film, throw: Scenario, held: Held) -> list[tuple[float,
     theta, t = film.angle, film.t
     frames = np.flatnonzero(~np.isnan(theta))
     if len(frames) < 8:
-        raise NoFlightError(f"{film.label}: cap and base were clicked together in {len(frames)} frames; 8 are needed")
+        raise NoFlightError(
+            f"{film.label}: cap and base were clicked, and not at one point, in {len(frames)} frames; 8 are needed"
+        )
     length = float(np.nanmedian(np.hypot(*(film.values[1] - film.values[0]).T)))
     if not 0.05 < length / throw.bottle.length < 5.0:
         raise NoFlightError(
@@ -705,7 +722,7 @@ def _first_guess_of_table(film: Film, held: Held) -> tuple[Likelihood, FloatArra
     turning = np.unwrap(values) if film.quantity == "theta" else values
     poly = np.polynomial.Polynomial.fit(t[:count] - release, turning[:count], 2 if film.quantity == "theta" else 1)
     theta0, omega0 = (
-        (float(poly(0.0)), float(poly.deriv()(0.0))) if film.quantity == "theta" else (0.0, float(poly(0.0)))
+        (float(poly(0.0)), float(poly.deriv()(0.0))) if held.theta0 is None else (held.theta0, float(poly(0.0)))
     )
     noise = max(third_differences(values), 1e-7 * float(np.ptp(values)), 1e-12)
     likelihood = Likelihood(film, replace(held, release=release), float(t[-1]), noise)

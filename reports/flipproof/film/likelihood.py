@@ -131,6 +131,7 @@ class Held:
     tilt : bool - the picture's vertical is true
     scale : bool - gravity in the picture is 9.81 m/s^2
     noise : float or None - standard deviation of one coordinate
+    theta0 : float or None - [rad] at the release, of a table of omega, which does not tell it
     """
 
     release: float | None = None
@@ -139,6 +140,7 @@ class Held:
     tilt: bool = False
     scale: bool = False
     noise: float | None = None
+    theta0: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,8 +225,8 @@ class Likelihood:
             priors |= {name: (0.0, size) for name, size in zip(hand, PULL * self.count, strict=True)}
             if held.tilt:
                 priors["ax"] = 0.0, TIGHT
-        elif self.film.quantity == "omega":
-            priors["theta0"] = 0.0, 1.0
+        elif held.theta0 is not None:
+            priors["theta0"] = held.theta0, TIGHT
         expected, stiffness = np.zeros(len(self.index)), np.zeros(len(self.index))
         for name, (value, deviation) in priors.items():
             expected[self.index[name]], stiffness[self.index[name]] = value, deviation**-2
