@@ -88,16 +88,22 @@ class Assessment:
         return np.asarray(estimate.flying & estimate.film.clicked.all(axis=0) & ~estimate.doubted.any(axis=0))
 
     @cached_property
-    def doubts(self) -> tuple[int, int]:
-        """How many clicks in flight, or values of a table, are doubted, and of how many."""
+    def doubts(self) -> tuple[int, int, int]:
+        """How many clicks in flight are doubted, of how many, and how many values before the first that is not.
+
+        The last is that of a table, whose first values tell omega_0; of points 0.
+        """
         estimate = self.estimate
-        return int(estimate.doubted.sum()), int((estimate.film.clicked & estimate.flying).sum())
+        inside = estimate.film.clicked & estimate.flying
+        doubted = estimate.doubted[inside]
+        first = 0 if estimate.likelihood.planar else int(np.argmin(np.append(doubted, False)))
+        return int(doubted.sum()), len(doubted), first
 
     @property
     def doubts_too_many(self) -> bool:
         """Whether more is doubted than a share ``BAD`` of bad clicks leaves: what is left then fits by choice."""
-        doubted, total = self.doubts
-        return bool(binom.sf(doubted - 1, total, BAD) < CHANCE_OF_DOUBTS)
+        doubted, total, first = self.doubts
+        return first > 1 or bool(binom.sf(doubted - 1, total, BAD) < CHANCE_OF_DOUBTS)
 
     @cached_property
     def fitted(self) -> tuple[FloatArray, FloatArray]:
@@ -497,11 +503,12 @@ class Assessment:
                 "better pair may have been missed, and no interval is promised to hold the truth"
             )
         if self.doubts_too_many:
-            doubted, total = self.doubts
+            doubted, total, first = self.doubts
+            begin = f", the first {first} among them" if first > 1 else ""
             return (
-                f"the equation does not explain the flight: it doubts {doubted} of {total} values, where {BAD:.0%} may "
-                f"be bad: see whether these are, or fit another equation{self.held_words}{self.unit_hint}; no interval "
-                "is promised to hold the truth"
+                f"the equation does not explain the flight: it doubts {doubted} of {total} values{begin}, where "
+                f"{BAD:.0%} may be bad: see whether these are, or fit another equation{self.held_words}"
+                f"{self.unit_hint}; no interval is promised to hold the truth"
             )
         if self.runs > 0.005 and "noise" in self.held:
             factor = 1e3 if self.unit("noise") == "m" else 1.0

@@ -42,7 +42,7 @@ class Measured:
         for fit in self.fits:
             solver = fit.estimate.solver
             names = [name for name in ("gamma", "restitution", "omega0", "release") if name in fit.estimate.draws]
-            doubted, total = fit.doubts
+            doubted, total, _ = fit.doubts
             note = ", ".join(f"{name} = {fit.number(name)}" for name in names)
             left_out = f" without the {doubted} of {total} values that it doubts" if doubted else ""
             title = f"{HELD[solver]} fitted to {self.film.label}{left_out}"
