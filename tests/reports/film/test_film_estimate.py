@@ -15,12 +15,16 @@ from flipproof.cli.main import main
 from flipproof.film import page
 from flipproof.film.clip import SCHEMA, read_film, read_table, smoothed_rate
 from flipproof.film.estimate import (
+    AFTER,
+    TRUST,
     Grid,
     NoFlightError,
+    _touch_costs,
     estimate,
     exchange_gain,
     exchanged,
     is_sharp,
+    near_flight,
     settle,
     shortest,
 )
@@ -314,6 +318,22 @@ def test_a_soft_table_is_not_taken_for_flight(fps):
     for name in ("touch", "g"):
         low, high = found.interval(name)
         assert low <= made.truth[name] <= high, name
+
+
+def test_a_bottle_that_stops_at_once_is_not_taken_for_one_on_a_soft_table(quick):
+    """Frames long after the touch chose a soft table by their speed, and the touch was 1 to 10 ms early."""
+    one, held, t, lines = quick[1].estimate, 0, np.arange(240) / 240, np.arange(240)
+    for k, after in enumerate(np.linspace(0.42, 0.52, 12)):  # when it falls
+        touch = float(one.fit.x[0]) + after
+        stopped = replace(one.film, t=np.minimum(t, touch), lines=lines)
+        values, _ = one.likelihood.replaced(film=stopped).model(one.curve, one.fit.x)
+        film = replace(stopped, t=t, values=values + np.random.default_rng(k).normal(0, 5e-4, values.shape))
+        near = near_flight(film, one.likelihood.replaced(touch=touch), float(one.fit.x[0]), AFTER)
+        times, costs, _ = _touch_costs(near, one.curve, one.fit.x)
+        share = np.cumsum(np.exp(TRUST * (costs.min() - costs)))
+        low, high = times[np.searchsorted(share, np.array([0.025, 0.975]) * share[-1])]
+        held += low <= touch <= high
+    assert held >= 10
 
 
 def test_a_touch_after_which_the_bottle_still_falls_is_refused(quick):
