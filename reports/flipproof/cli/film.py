@@ -75,8 +75,8 @@ def add_film(commands: Any) -> None:
 def _add_film_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--cap", metavar="NAME", help="track of the cap in a Tracker export")
     command.add_argument("--base", metavar="NAME", help="track of the base in a Tracker export")
-    command.add_argument("--length-unit", default="", metavar="UNIT", help="of x and y of an export: m, cm, mm")
-    command.add_argument("--time-unit", default="s", metavar="UNIT", help="of t of an export: s, ms (%(default)s)")
+    command.add_argument("--length-unit", default="", metavar="UNIT", help="of x and y: m, cm, mm")
+    command.add_argument("--time-unit", default="s", metavar="UNIT", help="of t: s, ms (%(default)s)")
     command.add_argument(
         "--frame-rate", type=real, metavar="HZ", help="frame rate of the recording, if t is slow motion"
     )
@@ -101,6 +101,9 @@ def command_film(options: argparse.Namespace) -> int:
     from flipproof.output.folder import check_replaceable, replaced_folder
 
     if options.out is not None:
+        for path in options.files:
+            if path.resolve().is_relative_to(options.out.resolve()):
+                raise ValueError(f"--out {options.out} holds {path.name}, which this command reads; name another")
         check_replaceable(options.out, options.kind)
     if len(set(options.model)) < len(options.model):
         raise ValueError(f"--model names {next(n for n in options.model if options.model.count(n) > 1)} twice")

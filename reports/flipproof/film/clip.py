@@ -7,6 +7,7 @@ A track.csv has one row per frame, SI units and empty cells for missing values. 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -29,13 +30,14 @@ SCHEMA: Final = MappingProxyType(
         "base_x": "where the base was clicked [m]",
         "base_y": "",
         "theta": "angle of cap to base from the downward vertical, as clicked, turns counted [rad]",
-        "omega": "five-point average of its central differences [rad/s]; empty where these reach over release or touch",
+        "omega": "five-point average of its central differences [rad/s]; empty where these reach over release or "
+        "touch; of a table of omega its values",
         "theta_fit": "angle of the fitted flight [rad]; empty outside the flight, as the next three",
         "omega_fit": "its angular velocity [rad/s]",
         "cap_miss": "distance of the click from the fitted cap [m]",
         "base_miss": "distance of the click from the fitted base [m]",
         "cap_doubted": "1: the click is more likely bad than not",
-        "base_doubted": "1: the click is more likely bad than not",
+        "base_doubted": "the same; of a table of theta or omega both are those of its value",
         "in_flight": "1: from release to touch",
         "t_over_T": "(t - release) / (touch - release); empty if the film ends before the touch",
         "line": "line of the file the frame came from",
@@ -70,8 +72,8 @@ def read_film(
     Parameters
     ----------
     cap, base : names of the tracks of an export
-    length_unit, time_unit : of an export; its headings may state the unit of length instead
-    frame_rate : at which an export was recorded [1/s], if its times are in slow motion
+    length_unit, time_unit : m and s by default; the headings of an export may state the unit of length instead
+    frame_rate : at which the film was recorded [1/s], if its times are in slow motion
     quantity : what to take from a table that has points, theta and omega; the first of these by default
 
     Raises
@@ -81,14 +83,26 @@ def read_film(
     """
     if (cap is None) != (base is None):
         raise ValueError("--cap and --base name the two tracks of a Tracker export; give both or neither")
+    if time_unit not in SECONDS:
+        raise ValueError(f"time_unit = {time_unit!r} is unknown; known: {', '.join(SECONDS)}")
+    if frame_rate is not None and not 1 <= frame_rate <= 1e6:
+        raise ValueError(f"frame_rate = {frame_rate:g} 1/s is outside [1, 1e6]")
     if cap is not None and base is not None:
         table = read_track_table(*paths)
         return _from_tracks(table, cap, base, _length_unit(table, cap, base, length_unit), time_unit, frame_rate)
-    if length_unit or frame_rate is not None:
-        raise ValueError("--length-unit and --frame-rate are those of a Tracker export; give --cap and --base, too")
     if len(paths) > 1:
-        raise ValueError("several files are exports of one clip by Tracker; name its tracks by --cap and --base")
-    return read_table(paths[0], quantity)
+        raise ValueError(
+            "several files: name the tracks by --cap and --base if they are Tracker's of one clip; fit --each takes "
+            "several films of one bottle"
+        )
+    film = read_table(paths[0], quantity)
+    if length_unit not in ("", *METRES):
+        raise ValueError(f"length_unit = {length_unit!r} is unknown; known: {', '.join(METRES)}")
+    if length_unit and film.quantity != "points":
+        raise ValueError(f"--length-unit is that of points; {paths[0]} is a table of {film.quantity}")
+    seconds = SECONDS[time_unit] if frame_rate is None else 1.0 / (frame_rate * float(np.median(np.diff(film.t))))
+    release = None if film.release is None else film.release * seconds
+    return replace(film, t=film.t * seconds, values=film.values * METRES[length_unit or "m"], release=release)
 
 
 def read_table(path: Path, quantity: Quantity | None = None) -> Film:
@@ -96,6 +110,8 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     names, rows = read_cells(path)
     columns_of: dict[Quantity, tuple[str, ...]] = {"points": POINT_COLUMNS, "theta": ("theta",), "omega": ("omega",)}
     available = [kind for kind, columns in columns_of.items() if set(columns) <= set(names)]
+    filled = {name for k, name in enumerate(names) if any(cells[k].strip() for _, cells in rows)}
+    available.sort(key=lambda kind: not filled.issuperset(columns_of[kind]))  # a track of omega has no points
     header_text = f"; it has {shortened(', '.join(names), 80)}"
     if "t" not in names:
         raise ValueError(
@@ -129,6 +145,7 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     if chosen == "points":
         values = np.array([numbers[:, 1:3], numbers[:, 3:5]])
         return Film(label=path.name, t=t, values=values, quantity=chosen, lines=lines, notes=("a track.csv",))
+    _check_turning(path, chosen, numbers[:, 1], lines)
     note = (
         f"a table of {chosen}: its first row is the release unless --release says otherwise"
         if release is None
@@ -137,6 +154,24 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
     return Film(
         label=path.name, t=t, values=numbers[None, :, 1:], quantity=chosen, lines=lines, notes=(note,), release=release
     )
+
+
+def _check_turning(path: Path, quantity: str, values: FloatArray, lines: NDArray[np.int64]) -> None:
+    """Refuse theta [rad] whose turns are not counted, and a table in which nothing turns."""
+    if np.ptp(values) == 0.0 and (quantity == "theta" or values[0] == 0.0):
+        raise ValueError(f"{path}: {quantity} is {values[0]:g} in every row: nothing turns; see what was measured")
+    steps = np.diff(values) - np.median(np.diff(values))
+    if quantity != "theta" or np.median(np.abs(np.diff(values))) > np.pi / 2:
+        return
+    whole = np.rint(steps / (2 * np.pi))
+    turns = np.cumsum(np.where((np.abs(whole) == 1) & (np.abs(steps - 2 * np.pi * whole) < 1.0), whole, 0))
+    wrapped = np.flatnonzero((turns[:-1] != 0) & (turns[1:] == turns[:-1]))  # a bad row jumps there and back
+    if len(wrapped):
+        k = int(wrapped[0])
+        raise ValueError(
+            f"{path}: theta jumps by {values[k + 1] - values[k]:.3g} rad, about a whole turn, at line {lines[k + 1]}: "
+            "count its turns, as numpy.unwrap does"
+        )
 
 
 def _flight_of_track(
@@ -161,10 +196,6 @@ def _from_tracks(table: TrackTable, cap: str, base: str, unit: str, time_unit: s
     tracks = table.track(cap), table.track(base)
     if tracks[0] is tracks[1]:
         raise ValueError(f"cap and base are both {cap!r}; two tracks are needed")
-    if time_unit not in SECONDS:
-        raise ValueError(f"time_unit = {time_unit!r} is unknown; known: {', '.join(SECONDS)}")
-    if frame_rate is not None and not 1 <= frame_rate <= 1e6:
-        raise ValueError(f"frame_rate = {frame_rate:g} 1/s is outside [1, 1e6]")
     frame_time, frames, note = frame_grid(table)
     seconds = SECONDS[time_unit] if frame_rate is None else 1.0 / (frame_rate * frame_time)
     values = np.array([track.points() for track in tracks]) * METRES[unit]

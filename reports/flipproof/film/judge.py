@@ -10,11 +10,11 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import gaussian_kde, norm
+from scipy.stats import binom, gaussian_kde, norm
 
 from flipproof.film.estimate import DRAWS, MAX_RATE, SCALE, UNITS, Estimate, exchange_gain, shortest, third_differences
 from flipproof.film.fall import LATER, fall_after, hand_share
-from flipproof.film.likelihood import GRAVITY
+from flipproof.film.likelihood import BAD, GRAVITY
 from ode_reference.solver import WATERS
 from slicemodel.trajectory import FloatArray
 
@@ -35,8 +35,15 @@ SCALE_ERROR: Final = 0.03
 EXCHANGED: Final = 20.0
 """Logarithm of a ratio of likelihoods: a film that gains more by exchanging cap and base is refused."""
 
+CHANCE_OF_DOUBTS: Final = 1e-5
+"""Probability of at least so many bad clicks below which an equation explains no flight: four of 30 are believed."""
+
 MIN_FLIGHT: Final = 0.1
 """Shortest flight of a bottle that is believed [s]: an equation may fit a few frames of whatever turns."""
+
+MAX_FLIGHT: Final = 10.0
+MAX_OMEGA0: Final = 200.0
+"""Duration [s] and angular velocity [rad/s] beyond any throw: a table is in other units."""
 
 JUMP: Final = 0.35
 """Jump of both ends between two clicks, fraction of the bottle's length a frame, that no hand makes.
@@ -79,6 +86,24 @@ class Assessment:
         """Frames in flight with an angle that is not doubted, shape (P,)."""
         estimate = self.estimate
         return np.asarray(estimate.flying & estimate.film.clicked.all(axis=0) & ~estimate.doubted.any(axis=0))
+
+    @cached_property
+    def doubts(self) -> tuple[int, int, int]:
+        """How many clicks in flight are doubted, of how many, and how many values before the first that is not.
+
+        The last is that of a table, whose first values tell omega_0; of points 0.
+        """
+        estimate = self.estimate
+        inside = estimate.film.clicked & estimate.flying
+        doubted = estimate.doubted[inside]
+        first = 0 if estimate.likelihood.planar else int(np.argmin(np.append(doubted, False)))
+        return int(doubted.sum()), len(doubted), first
+
+    @property
+    def doubts_too_many(self) -> bool:
+        """Whether more is doubted than a share ``BAD`` of bad clicks leaves: what is left then fits by choice."""
+        doubted, total, first = self.doubts
+        return first > 1 or bool(binom.sf(doubted - 1, total, BAD) < CHANCE_OF_DOUBTS)
 
     @cached_property
     def fitted(self) -> tuple[FloatArray, FloatArray]:
@@ -161,10 +186,12 @@ class Assessment:
 
     @property
     def held(self) -> dict[str, tuple[float, str]]:
-        """What is held: the parameter, its value [as of ``UNITS``] and the option that holds it."""
-        held = self.estimate.held
+        """What is held: the parameter, its value [as of ``UNITS``] and what holds it."""
+        held, release = self.estimate.held, self.estimate.likelihood.held.release
+        given = held.release is not None and held.release != self.estimate.film.release
         values: dict[str, tuple[float | None, str]] = {
-            "release": (self.estimate.likelihood.held.release, "--release"),
+            "release": (release, "--release" if given else "the release of the table"),
+            "theta0": (held.theta0 if self.estimate.curve.slopes is not None else None, "theta0 of the scenario"),
             "touch": (held.touch, "--landing"),
             "noise": (held.noise, "--noise"),
             "tilt": (0.0 if held.tilt else None, "--hold tilt"),
@@ -189,7 +216,7 @@ class Assessment:
             for name in SHOWN
             if name in estimate.draws
             and (name != "touch" or seen)
-            and (name != "theta0" or estimate.film.quantity != "omega")
+            and (name != "theta0" or estimate.film.quantity != "omega" or name in self.held)
         )
 
     def unit(self, name: str) -> str:
@@ -197,6 +224,16 @@ class Assessment:
         if name == "noise" and self.estimate.film.quantity != "points":
             return "rad" if self.estimate.film.quantity == "theta" else "rad/s"
         return UNITS[name]
+
+    @property
+    def unit_hint(self) -> str:
+        """After a semicolon, in which other unit a table may be; nothing if its numbers may be SI units."""
+        film, omega0 = self.estimate.film, self.estimate.best["omega0"]
+        if film.quantity == "points":
+            return ""
+        if film.t[-1] - film.t[0] > MAX_FLIGHT:
+            return f"; the table lasts {film.t[-1] - film.t[0]:.3g} s: its times may be in ms (--time-unit ms)"
+        return f"; omega0 is {omega0:.3g} rad/s: its angles may be in degrees" if abs(omega0) > MAX_OMEGA0 else ""
 
     @property
     def sliced(self) -> bool:
@@ -212,7 +249,7 @@ class Assessment:
     @property
     def explained(self) -> bool:
         """Whether noise alone explains the size and order of the residuals, and no other equation is far likelier."""
-        if self.log_deficit > OUTDONE or not self.falls or self.estimate.rugged:
+        if self.log_deficit > OUTDONE or not self.falls or self.estimate.rugged or self.doubts_too_many:
             return False
         spread = 5.0 / math.sqrt(max(4, len(self.residuals)))
         return self.runs > 0.005 and self.noise <= max(self.own_noise, 1e-12) * (1.0 + spread)
@@ -266,8 +303,10 @@ class Assessment:
                     "click more frames of the flight, or see whether this is the bottle that is assumed "
                     f"({estimate.throw.fill_fraction:.0%} full, {state}: --scenario)"
                 )
+            elif not estimate.likelihood.planar:
+                advice = f"fit another equation; the water is taken to be {state} (--scenario){self.unit_hint}"
             raise UnsoundError(
-                f"{film.label}: {estimate.solver} fits {len(self.residuals)} of {total} clicked frames as a flight, of "
+                f"{film.label}: {estimate.solver} fits {len(self.residuals)} of {total} frames as a flight, of "
                 f"{clicked} that it takes for one; 8 are needed: {advice}"
             )
         if estimate.likelihood.planar:
@@ -436,7 +475,8 @@ class Assessment:
         if name == "length" and abs(self.estimate.best["length"] / bottle - 1.0) > OTHER_BOTTLE:
             return f"  the bottle that is assumed is {bottle:g} m long: click its ends, or name it by --scenario"
         return {
-            "told": "", "held": ", held", "cannot tell": "  the film cannot tell it",
+            "told": "", "held": ", held" + " (scenario)" * (name == "theta0"),
+            "cannot tell": "  the film cannot tell it",
             "bounded above": "  bounded from above only: 0 is not excluded",
             "bounded below": "  bounded from below only", "not in this equation": "  not in this equation",
         }[verdict]  # fmt: skip
@@ -462,6 +502,14 @@ class Assessment:
                 "next to this gamma and restitution the flight fits far worse, as with little drag and many slices: a "
                 "better pair may have been missed, and no interval is promised to hold the truth"
             )
+        if self.doubts_too_many:
+            doubted, total, first = self.doubts
+            begin = f", the first {first} among them" if first > 1 else ""
+            return (
+                f"the equation does not explain the flight: it doubts {doubted} of {total} values{begin}, where "
+                f"{BAD:.0%} may be bad: see whether these are, or fit another equation{self.held_words}"
+                f"{self.unit_hint}; no interval is promised to hold the truth"
+            )
         if self.runs > 0.005 and "noise" in self.held:
             factor = 1e3 if self.unit("noise") == "m" else 1.0
             unit = "mm" if factor > 1.0 else self.unit("noise")
@@ -476,7 +524,7 @@ class Assessment:
         )
         return (
             f"the equation does not explain the flight: a misfit of {self.misfit} {unit} that no drag and no "
-            f"restitution explains{order}{self.held_words}; no interval is promised to hold the truth"
+            f"restitution explains{order}{self.held_words}{self.unit_hint}; no interval is promised to hold the truth"
         )
 
 

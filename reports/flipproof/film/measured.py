@@ -42,8 +42,10 @@ class Measured:
         for fit in self.fits:
             solver = fit.estimate.solver
             names = [name for name in ("gamma", "restitution", "omega0", "release") if name in fit.estimate.draws]
+            doubted, total, _ = fit.doubts
             note = ", ".join(f"{name} = {fit.number(name)}" for name in names)
-            title = f"{HELD[solver]} fitted to {self.film.label}"
+            left_out = f" without the {doubted} of {total} values that it doubts" if doubted else ""
+            title = f"{HELD[solver]} fitted to {self.film.label}{left_out}"
             yield observed(f"measured-fit-{solver}", title, fit.discrepancy, unit, note)
 
     def exhibit(self) -> Exhibit:

@@ -28,14 +28,14 @@ def track_csv(assessment: Assessment) -> str:
     inside = estimate.flying
     release, touch = estimate.best["release"], estimate.best["touch"] if "touch" in assessment.shown else np.nan
     points = np.full((2, len(t), 2), np.nan)
-    misses, doubted = np.full((2, len(t)), np.nan), np.zeros((2, len(t)), dtype=np.bool_)
+    misses, doubted = np.full((2, len(t)), np.nan), np.broadcast_to(estimate.doubted, (2, len(t)))
     theta = assessment.theta
     if film.quantity == "points":
-        points, doubted = film.values, estimate.doubted
+        points = film.values
         _, _, residuals = estimate.likelihood.per_click(estimate.curve, estimate.fit.x)
         misses = np.where(film.clicked & inside, np.hypot(*np.moveaxis(residuals, 2, 0)), np.nan)
     mask = np.where(inside, 1.0, np.nan)
-    omega = smoothed_rate(t, theta, inside)
+    omega = film.values[0, :, 0] if film.quantity == "omega" else smoothed_rate(t, theta, inside)
     columns = (
         t, *points[0].T, *points[1].T, theta, omega, theta_fit * mask, omega_fit * mask, *misses,
         *doubted.astype(int), inside.astype(int), (t - release) / (touch - release), film.lines,

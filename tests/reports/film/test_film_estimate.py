@@ -10,23 +10,28 @@ import film_simulator
 import numpy as np
 import pytest
 
+import ode_reference
 from flipproof.cli.main import main
 from flipproof.film import page
 from flipproof.film.clip import SCHEMA, read_film, read_table, smoothed_rate
 from flipproof.film.estimate import (
+    AFTER,
+    TRUST,
     Grid,
     NoFlightError,
+    _touch_costs,
     estimate,
     exchange_gain,
     exchanged,
     is_sharp,
+    near_flight,
     settle,
     shortest,
 )
 from flipproof.film.fall import fall_after, hand_share
 from flipproof.film.judge import EXCHANGED, Assessment, UnsoundError, shared_draws
 from flipproof.film.likelihood import Film, Held
-from flipproof.film.measured import hold, read_measured
+from flipproof.film.measured import Measured, hold, read_measured
 from flipproof.output.tables import read_curve
 from slicemodel import Scenario
 
@@ -52,6 +57,10 @@ def written(path, made):
     return path
 
 
+def table(quantity, t, values):
+    return Film(label="table", t=t, values=values[None, :, None], quantity=quantity, lines=np.arange(len(t)) + 2)
+
+
 def judged_of(made, filling=0.5):
     return made, Assessment(estimate(film_of(made), replace(THROW, water_mass=filling)))
 
@@ -72,6 +81,16 @@ def bottles():
 def quick():
     """240 frames a second of a bottle that is flicked away: the hand stops pushing within the last 40 ms."""
     return judged_of(clip(1, fps=240, noise=0.5e-3, flick=0.08, duration=0.3, hand=0.2))
+
+
+@pytest.fixture(scope="module")
+def rates():
+    """A table of omega by Eq. 8, one of 60 values bad, and its fit by Eq. 8."""
+    t = np.linspace(0.0, 0.5, 60)
+    throw = replace(THROW, drag=12.0 * THROW.slice_mass, restitution=0.4, omega0=20.0, theta0=1.0, duration=0.5)
+    omega = ode_reference.solve(throw, "eq8", times=t).omega + np.random.default_rng(0).normal(0, 0.1, len(t))
+    omega[20] += 3.0
+    return Assessment(estimate(table("omega", t, omega), throw, "eq8"))
 
 
 @pytest.fixture(scope="module")
@@ -299,6 +318,22 @@ def test_a_soft_table_is_not_taken_for_flight(fps):
     for name in ("touch", "g"):
         low, high = found.interval(name)
         assert low <= made.truth[name] <= high, name
+
+
+def test_a_bottle_that_stops_at_once_is_not_taken_for_one_on_a_soft_table(quick):
+    """Frames long after the touch chose a soft table by their speed, and the touch was 1 to 10 ms early."""
+    one, held, t, lines = quick[1].estimate, 0, np.arange(240) / 240, np.arange(240)
+    for k, after in enumerate(np.linspace(0.42, 0.52, 12)):  # when it falls
+        touch = float(one.fit.x[0]) + after
+        stopped = replace(one.film, t=np.minimum(t, touch), lines=lines)
+        values, _ = one.likelihood.replaced(film=stopped).model(one.curve, one.fit.x)
+        film = replace(stopped, t=t, values=values + np.random.default_rng(k).normal(0, 5e-4, values.shape))
+        near = near_flight(film, one.likelihood.replaced(touch=touch), float(one.fit.x[0]), AFTER)
+        times, costs, _ = _touch_costs(near, one.curve, one.fit.x)
+        share = np.cumsum(np.exp(TRUST * (costs.min() - costs)))
+        low, high = times[np.searchsorted(share, np.array([0.025, 0.975]) * share[-1])]
+        held += low <= touch <= high
+    assert held >= 10
 
 
 def test_a_touch_after_which_the_bottle_still_falls_is_refused(quick):
@@ -616,3 +651,92 @@ def test_a_measured_rate_reaches_over_neither_release_nor_touch():
     np.testing.assert_allclose(rate[known & (t < 0.29)], 5.0, rtol=1e-12)
     assert np.count_nonzero(known & flying) == np.count_nonzero(flying) - 6
     assert np.count_nonzero(known) == len(t) - 18
+
+
+@pytest.mark.parametrize(
+    ("doubts", "explained"), [((4, 30, 0), True), ((5, 60, 1), True), ((6, 40, 0), False), ((2, 60, 2), False)]
+)
+def test_an_equation_that_doubts_too_many_clicks_explains_nothing(quick, doubts, explained):
+    judged = replace(quick[1])
+    judged.__dict__["doubts"] = doubts
+    assert judged.explained is explained
+    assert ("doubts 6 of 40 values" in judged.conclusion) is (doubts == (6, 40, 0))
+    assert (", the first 2 among them" in judged.conclusion) is (doubts == (2, 60, 2))
+
+
+def test_ice_is_not_said_to_be_water():
+    """omega_0 was 120 rad/s instead of 18, "the equation explains the flight": the first five values were doubted."""
+    t = np.linspace(0.0, 0.5, 30)
+    ice = table("omega", t, 18.0 + np.random.default_rng(30).normal(0, 0.05, len(t)))
+    judged = Assessment(estimate(ice, THROW))
+    assert not judged.explained
+    assert "does not explain" in judged.conclusion
+
+
+def test_theta0_of_a_table_of_omega_is_the_scenarios(rates):
+    """It was 0, silently: Eq. 8 was said not to explain its own flight."""
+    assert rates.explained
+    assert "  theta0       1 rad, held (scenario)" in rates.lines()
+    assert rates.held_words == "; or a value that is held is wrong: the release of the table, theta0 of the scenario"
+    for name, true in (("gamma", 6.0), ("restitution", 0.4), ("omega0", 20.0)):
+        low, high = rates.estimate.interval(name, 0.999)
+        assert low <= true <= high, name
+
+
+def test_a_track_of_omega_keeps_its_values_and_doubts(rates, tmp_path):
+    (tmp_path / "track.csv").write_text(page.track_csv(rates), encoding="utf-8")
+    film = read_table(tmp_path / "track.csv")
+    np.testing.assert_allclose(film.values, rates.estimate.film.values, rtol=1e-12)
+    names, *rows = [line.split(",") for line in (tmp_path / "track.csv").read_text().splitlines() if line[0] != "#"]
+    for name in ("cap_doubted", "base_doubted"):
+        assert [k for k, row in enumerate(rows) if row[names.index(name)] == "1"] == [20]
+    measured = Measured(film=film, fits=(replace(rates, estimate=replace(rates.estimate, solver="midpoint")),))
+    assert next(measured.findings()).title.endswith(" without the 1 of 60 values that it doubts")
+
+
+def test_a_table_in_other_units_is_said_to_be(rates):
+    one = rates.estimate
+    assert rates.unit_hint == ""
+    slow = Assessment(replace(one, film=replace(one.film, t=1e3 * one.film.t)))
+    assert "--time-unit ms" in slow.unit_hint
+    fast = Assessment(replace(one, draws={**one.draws, "omega0": 57.3 * one.draws["omega0"]}))
+    assert "degrees" in fast.unit_hint
+
+
+def theta_of(tmp_path, theta):
+    rows = [f"{t!r},{angle!r}" for t, angle in zip((np.arange(len(theta)) / 120).tolist(), theta.tolist(), strict=True)]
+    (tmp_path / "theta.csv").write_text("\n".join(["t,theta", *rows]), encoding="utf-8")
+    return tmp_path / "theta.csv"
+
+
+def test_turns_that_are_not_counted_are_refused(tmp_path):
+    """Of 60 values 44 were doubted, and the equation said to explain the flight."""
+    turning = 1.0 + np.arange(60) / 6
+    wrapped = np.angle(np.exp(1j * turning))
+    with pytest.raises(
+        ValueError, match=r"theta jumps by -6\.1\d+ rad, about a whole turn, at line 15: count its turns"
+    ):
+        read_table(theta_of(tmp_path, wrapped))
+    one_bad = turning + 2 * np.pi * (np.arange(60) == 30)
+    for theta in (turning, one_bad, np.degrees(turning)):
+        assert read_table(theta_of(tmp_path, theta)).quantity == "theta"
+    with pytest.raises(ValueError, match="theta is 0 in every row: nothing turns"):
+        read_table(theta_of(tmp_path, 0.0 * turning))
+
+
+def test_one_point_for_both_ends_is_no_click_that_is_missing(quick):
+    film = quick[1].estimate.film
+    with pytest.raises(NoFlightError, match="not at one point, in 0 frames"):
+        estimate(replace(film, values=film.values[[0, 0]]), THROW)
+
+
+def test_a_track_in_slow_motion_is_mended_by_the_frame_rate(quick, tmp_path):
+    """It was refused with "name the recording's frame rate", and this with "give --cap and --base, too"."""
+    made, judged = quick
+    slow = replace(judged, estimate=replace(judged.estimate, film=replace(judged.estimate.film, t=8 * made.t)))
+    (tmp_path / "track.csv").write_text(page.track_csv(slow), encoding="utf-8")
+    for options in ({"frame_rate": 240.0}, {"time_unit": "ms", "frame_rate": 240.0}):
+        np.testing.assert_allclose(read_film([tmp_path / "track.csv"], **options).t, made.t, atol=1e-9)
+    in_mm = read_film([tmp_path / "track.csv"], length_unit="mm", time_unit="ms")
+    np.testing.assert_allclose(in_mm.values, 1e-3 * judged.estimate.film.values)
+    np.testing.assert_allclose(in_mm.t, 8e-3 * made.t, atol=1e-9)

@@ -114,6 +114,9 @@ REFUSED = {
     "frame rate": ((*BOTH, "--frame-rate", "0"), "frame_rate = 0 1/s is outside"),
     "twice": ((EXAMPLES / "tab.txt", *BOTH), r"tab\.txt is there twice"),
     "no tracks named": ((), "has no column t; .* needs --cap and --base"),
+    "several": ((EXAMPLES / "single_cap.txt",), "several files: .* fit --each takes several films of one bottle"),
+    "release": ((*BOTH, "--release", "9"), r"--release 9 s is no time of this film, which runs from 0 to \d"),
+    "landing": ((*BOTH, "--landing", "-1"), "--landing -1 s is no time of this film"),
     "order": ((*BOTH, "--release", "0.5", "--landing", "0.4"), "landing = 0.4 s does not follow release = 0.5 s"),
 }
 
@@ -129,6 +132,12 @@ def test_track_touches_no_foreign_folder(tmp_path):
     (tmp_path / "letter.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(ValueError, match=r"holds letter\.txt and not flipproof's own marker"):
         run("track", EXAMPLES / "tab.txt", *BOTH, "--out", tmp_path)
+
+
+def test_the_folder_of_what_is_read_is_not_written(tmp_path):
+    shutil.copy(EXAMPLES / "tab.txt", tmp_path / "tab.txt")
+    with pytest.raises(ValueError, match=r"holds tab\.txt, which this command reads; name another"):
+        run("track", tmp_path / "tab.txt", *BOTH, "--out", tmp_path)
 
 
 def exported(tmp_path, *arguments):
