@@ -526,7 +526,12 @@ ANSWERED: Final = (
 def _rebound_advice(hits: Impacts) -> str:
     """Return what is wrong with the speeds of impacts: all by one factor, the rebound; else how they are answered."""
     e = THROW.restitution
-    powers = {", the root of e": e**0.5, ", e squared": e**2, ", an elastic impact": 1.0}
+    powers = {
+        ", the root of e": e**0.5,
+        ", e squared": e**2,
+        ", an elastic impact": 1.0,
+        ", 1 / e, as if the speeds before and after were exchanged": 1.0 / e,
+    }
     moves = (hits.speed_after > 0.0) & (hits.speed_before > 0.0)
     wrong = []
     for end, name in ((1, "base"), (-1, "cap")):
@@ -542,6 +547,16 @@ def _rebound_advice(hits: Impacts) -> str:
     return f"{' and '.join(wrong)}: look at the rebound, and at what is answered of it" if wrong else ANSWERED
 
 
+def _ends_exchanged(answer: Answer, hits: Impacts) -> bool:
+    """Return whether most slices are nearer to the other end than that which they are said to strike."""
+    if answer.r is None:
+        return False
+    inside = hits.time < answer.t[-1]
+    rows = np.searchsorted(answer.t, hits.time[inside])
+    from_middle = answer.r[rows, hits.slice[inside]] - THROW.bottle.length / 2
+    return bool(inside.any() and np.mean(from_middle * hits.end[inside] < 0.0) > 0.8)
+
+
 def check_definitions(traits: Traits) -> CheckGenerator:
     """r_cm and inertia are those of the slices at the same instant; slices leave an impact at e times their speed.
 
@@ -555,6 +570,13 @@ def check_definitions(traits: Traits) -> CheckGenerator:
         error = np.abs(hits.speed_after - THROW.restitution * hits.speed_before) * (hits.speed_after > 0)
         error /= max(float(np.max((hits.speed_before, hits.speed_after))), 1e-300)
         holds = bool(error.max() <= 0.02)  # they may be read off two steps
+        if holds and _ends_exchanged(answer, hits):
+            return Observation(
+                holds=False,
+                expected="the end of an impact is 1 for the base and -1 for the cap",
+                observed="slices are near the other end when they strike",
+                advice="look at the sign of the end in the answered impacts",
+            )
         if not (holds and answer.r is not None and given):
             advice = _rebound_advice(hits)
             return Observation(

@@ -440,6 +440,7 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
             wrong[name] = float(rows[k]), float(room[k]), float(ask.times[k])
             row = int(np.argmax(rows > room))
             first_wrong = min(first_wrong, float(ask.times[:reached][clear][row]))
+    impacts_passed, onset = _onset(ask, truth.impacts or NO_IMPACTS, first_wrong) if wrong else (0, "")
     if finest.impacts is not None and clear.any():
         room_of_r = rooms.get("r", rooms["omega"])[clear]
         by_rest_speed = [
@@ -449,7 +450,6 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
         unmatched = [miss for miss in by_rest_speed if miss is not None]
         if len(unmatched) == len(by_rest_speed):
             wrong["impacts"] = unmatched[0]
-    impacts_passed, onset = _onset(ask, truth.impacts or NO_IMPACTS, first_wrong) if wrong else (0, "")
     return Comparison(
         wrong=wrong,
         own_error=float(np.max(own_errors["omega"][clear])) if clear.any() else float(own_errors["omega"].min()),

@@ -747,6 +747,8 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
         ("adaptive_leaves_off_just_before_answer", "velocity", "theta stands still between two of the times asked"),
         ("fixed_omega_from_differences", "start", "not a slope of theta"),
         ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
+        ("cashkarp_ends_exchanged_in_impacts", "definitions", "look at the sign of the end"),
+        ("blanesmoan_speeds_exchanged_in_impacts", "definitions", "as if the speeds before and after were exchanged"),
         pytest.param("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating", marks=pytest.mark.slow),
         pytest.param(
             "halving_released_level", "mirror", "right without weight: look at the weight", marks=pytest.mark.slow

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import InProcess, Patch
+from planted import InProcess, Patch, patches
 
 import ode_reference
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
@@ -145,3 +145,17 @@ def test_answers_beyond_all_bounds_break_nothing():
 
     for spoilt in (beyond, without_spin):
         assert told(Exact, WHOLE, spoilt=spoilt)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "words"),
+    [
+        ("cashkarp_cap_at_zero", "slices go on to half their height beyond an end"),
+        ("cashkarp_inelastic_after_fifty_impacts", "right until 50 impacts of a throw are over: look for a limit"),
+        ("blanesmoan_omega_of_previous_inertia", "answer the omega of the same instant"),
+    ],
+)
+def test_what_a_stranger_planted_is_told_where_it_is(mistake, words):
+    (result,) = certify(InProcess(patches("thirtieth")[mistake].solver(), "x"), ["piecewise"]).results
+    assert result.verdict == FAILED
+    assert words in result.line
