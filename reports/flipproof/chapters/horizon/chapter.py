@@ -233,7 +233,7 @@ def claim_release(study: Horizon) -> Finding:
         how = f"{times[0]:.3g} times the change, and {times[1]:.3g} times one of {OWN_SIZES[1]:.0e}"
     else:
         how = (
-            f"a change of {OWN_SIZES[1]:.0e} makes it {changes[1]:.1e}: not in proportion, because an impact happens "
+            f"a change of {OWN_SIZES[1]:.0e} makes it {changes[1]:.1e}: not in proportion, as when an impact happens "
             "in some of the flights only"
         )
     return observed(name, title, changes[0], "of ω₀", f"{how}; {words_of(*study.ensembles[0])}")
