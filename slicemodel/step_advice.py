@@ -73,15 +73,16 @@ def required_steps(
     good: int | None = None
     while octave * BASE <= MAX_STEPS:
         worst = _worst_of_octave(scenario, scheme, rebound, octave)
+        meets = worst * SAFETY <= tolerance
         rounding = worst > GROWS * least and octave * BASE * REFINEMENT > 4 * MAX_STEPS
-        if good is not None and (rounding or worst * SAFETY <= tolerance):
+        if good is not None and (rounding or meets):
             return good + 1
         if rounding:
             raise ValueError(
                 f"tolerance = {tolerance:g} is not seen to be met by {scheme}: the error is {least:.2g} at "
                 f"{octave * BASE // 2} steps, and rounding hides it on finer grids"
             )
-        good = octave * BASE if worst * SAFETY <= tolerance else None
+        good = octave * BASE if meets else None
         octave, least = 2 * octave, min(least, worst)
     raise ValueError(
         f"tolerance = {tolerance:g} needs more than {MAX_STEPS} steps of {scheme} "

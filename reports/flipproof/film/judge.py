@@ -341,8 +341,8 @@ class Assessment:
                 raise UnsoundError(
                     f"{film.label}: g = {gravity:.3g} m/s^2 in the picture, not {GRAVITY:g}: {stick} (lengths are "
                     f"{lengths:.3g} of the true ones), or name {clock} (times are {times:.3g} of the true ones), or "
-                    "see whether its times leave out frames, or it is another bottle than is assumed "
-                    f"({estimate.throw.fill_fraction:.0%} full: --scenario); y points up"
+                    "see whether its times leave out frames, cap and base are exchanged, or it is another bottle than "
+                    f"is assumed ({estimate.throw.fill_fraction:.0%} full: --scenario); y points up"
                 )
             if self.noise > 0.1 * estimate.best["length"]:
                 raise UnsoundError(
