@@ -84,7 +84,7 @@ def omega_band_call(run: Run) -> Call:
 
 
 def _doubt_of_engine(flight: Trajectory, tolerance: float) -> str:
-    """Return what half of an engine's step changes, unless its error is surely below the tolerance [omega_0]."""
+    """Return what half of an engine's step changes, if ``ENGINE_ERROR`` times that exceeds the tolerance [omega_0]."""
     dt, scenario = float(flight.settings["step"]), flight.scenario
     begin = f"{flight.label}: steps of {dt:.2g} s, not certified"
     if scenario.n_slices * scenario.duration / dt > QUICK:

@@ -228,7 +228,7 @@ def claim_release(study: Horizon) -> Finding:
     if len(study.ensembles) < len(OWN_SIZES):
         return observed(name, title, None, "of ω₀", "; ".join(study.problems))
     changes = [float(ensemble.change.max()) for _, ensemble in study.ensembles]
-    times = [change / size for change, size in zip(changes, OWN_SIZES, strict=True)]
+    times = [change / level.size for change, (level, _) in zip(changes, study.ensembles, strict=True)]
     if max(times) <= PROPORTIONAL * min(times):
         how = f"{times[0]:.3g} times the change, and {times[1]:.3g} times one of {OWN_SIZES[1]:.0e}"
     else:
