@@ -132,7 +132,7 @@ def build(
 
 def write(report: Report, folder: Path) -> None:
     """Write a finished report into an empty folder."""
-    files: dict[str, str | bytes | None] = {
+    files: dict[str, str | bytes] = {
         **report.pages,
         "summary.json": summary_text(report.summary),
         SCHEMA_NAME: schema_text(),
@@ -140,10 +140,8 @@ def write(report: Report, folder: Path) -> None:
         **report.tables,
     }
     for exhibit in report.exhibits:
-        contents = {"svg": exhibit.drawing.svg, "png": exhibit.drawing.png or None, "csv": exhibit.table}
-        files |= {f"figures/{exhibit.name}.{kind}": content for kind, content in contents.items()}
+        files |= {f"figures/{name}": content for name, content in exhibit.files().items()}
     for path, content in files.items():
-        if content is not None:
-            place = folder / path
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+        place = folder / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))

@@ -32,7 +32,7 @@ from flipproof.chapters.maps.study import (
     plan_map,
     study_readings,
 )
-from flipproof.chapters.solvers import SCHEMES
+from flipproof.chapters.solvers import FREE, SCHEMES
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt, results_of
 from flipproof.frame.columns import rows_csv
@@ -94,10 +94,11 @@ def claims(maps: Maps) -> Claims:
 
 def figures(maps: Maps) -> Iterator[Exhibit]:
     """Yield every map."""
-    yield from map(_exhibit, results_of(maps).values())
+    yield from map(exhibit, results_of(maps).values())
 
 
-def _exhibit(study: ValidityMap) -> Exhibit:
+def exhibit(study: ValidityMap) -> Exhibit:
+    """Return a map with its words and the numbers of its cells."""
     dominant = study.dominant
     which = "fair share (mean over all orders of changing)"
     shade, contours = (
@@ -178,17 +179,23 @@ def _within(study: ValidityMap) -> str:
 
 
 def _cells_csv(study: ValidityMap) -> str:
-    """Return every cell: the plateau of each solver, and the assumption with the largest fair share."""
+    """Return every cell: plateaus, fair shares and the assumption with the largest, differences and step errors."""
     solvers = (*LADDER, *EXTRA)
+    others = [name for name in solvers if name != FREE]
     label = LABELS[study.axis]
     for sign, word in (("γ", "gamma"), ("ω", "omega"), ("₀", "_0"), ("Δ", "d")):
         label = label.replace(sign, word)
     return rows_csv(
         ("fill fraction [1]", label, "largest fair share",
-         *(f"plateau of omega/omega_0 {name} [1]" for name in solvers), "not computed because"),
+         *(f"plateau of omega/omega_0 {name} [1]" for name in solvers),
+         *(f"fair share of {name} [1]" for name in RUNGS),
+         *(f"largest difference of {name} from {FREE} [1]" for name in others),
+         *(f"step error of {name} [1]" for name in SCHEMES), "not computed because"),
         (
             (study.fills[column], study.values[row], RUNGS[k] if k >= 0 else None,
-             *(study.level[name][row, column] for name in solvers), study.reason[row, column])
+             *(study.level[name][row, column] for name in solvers), *study.shares[:, row, column],
+             *(study.largest[name][row, column] for name in others),
+             *(study.step_error[name][row, column] for name in SCHEMES), study.reason[row, column])
             for (row, column), k in np.ndenumerate(study.dominant)
         ),
     )  # fmt: skip
@@ -282,16 +289,6 @@ def _crosses(error: FloatArray, level: float) -> bool:
     """Return whether a map has a contour at ``level``."""
     finite = error[np.isfinite(error)]
     return bool(finite.size and finite.min() < level < finite.max())
-
-
-def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[FloatArray]:
-    """Return the contour of ``error`` as lines of (fill fraction, value) on the map, each of shape (K, 2)."""
-    if not _crosses(error, level):
-        return []
-    contours = Figure().subplots().contour(study.fills, study.values, error, levels=[level])
-    # Interpolation may miss the ends of an axis by a last digit.
-    low, high = np.array([(axis[0], axis[-1]) for axis in (study.fills, study.values)]).T
-    return [np.clip(line, low, high) for line in contours.allsegs[0] if len(line)]
 
 
 def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:
