@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -33,7 +33,6 @@ class Report:
     """A finished report in memory; ``tables`` maps paths in its folder to the text of files.
 
     ``pages`` are the files ``index.html``, the story, and ``evidence.html``, by their names.
-    ``seconds`` are wall times [s]: of every claim, by its finding's id; ``whole`` is that of everything.
     """
 
     findings: tuple[Finding, ...]
@@ -41,8 +40,6 @@ class Report:
     pages: Mapping[str, str]
     summary: dict[str, Any]
     tables: dict[str, str]
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    whole: float | None = None
 
     @property
     def failed(self) -> tuple[Finding, ...]:
@@ -125,8 +122,6 @@ def build(
         pages=pages,
         summary=summary,
         tables={path: text for result in present for path, text in result.chapter.tables(result.study_result).items()},
-        seconds={id_: seconds for result in results.values() for id_, seconds in result.seconds.items()},
-        whole=sum(gathered.stages.seconds.values()),
     )
 
 
@@ -136,7 +131,7 @@ def write(report: Report, folder: Path) -> None:
         **report.pages,
         "summary.json": summary_text(report.summary),
         SCHEMA_NAME: schema_text(),
-        "junit.xml": junit_text(report.findings, seconds=report.seconds, whole=report.whole),
+        "junit.xml": junit_text(report.findings, seconds=sum(report.summary["stages"].values())),
         **report.tables,
     }
     for exhibit in report.exhibits:

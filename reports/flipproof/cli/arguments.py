@@ -191,15 +191,13 @@ def write_json(path: Path | None, mapping: Mapping[str, Any]) -> None:
         write_text(path, json.dumps(json_ready(mapping), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def write_junit(
-    path: Path | None, findings: Sequence[Finding], suite: str, seconds: Mapping[str, float] | None = None
-) -> None:
+def write_junit(path: Path | None, findings: Sequence[Finding], suite: str) -> None:
     """Write findings as JUnit XML into the file that ``--junit`` names, if any."""
     if path is not None:
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text
 
-        write_text(path, junit_text(findings, suite, seconds))
+        write_text(path, junit_text(findings, suite))
 
 
 def command_line() -> str:

@@ -101,7 +101,7 @@ def command_check(options: argparse.Namespace) -> int:
             scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store,
             guests=options.guests, timeout=options.timeout,
         )  # fmt: skip
-    write_junit(options.junit, checked.findings, "flipproof check", checked.seconds)
+    write_junit(options.junit, checked.findings, "flipproof check")
     write_json(
         options.json,
         {"findings": [finding.to_mapping() for finding in checked.findings], "conclusion": checked.conclusion},
