@@ -125,18 +125,23 @@ real = reader("a number", float, lambda _: True)
 
 
 def output(text: str) -> Path:
-    """Return the path of an option that a command writes: by this type ``refuse_overwriting`` knows such options."""
+    """Return the path of an option for a file that a command writes; ``check_outputs`` knows it by this type."""
     return Path(text)
 
 
-def check_outputs(options: argparse.Namespace, *names: str) -> None:
+def place(text: str) -> Path:
+    """Return the path of an option for a folder that a command makes, or for a file in it, which it checks itself."""
+    return Path(text)
+
+
+def check_outputs(options: argparse.Namespace, command: argparse.ArgumentParser) -> None:
     """Refuse by a ValueError, before the work begins, files of options that could not be written after it.
 
     No two options may name one file; a device or a pipe takes both. What the command reads is kept by
     ``refuse_overwriting``.
     """
     taken: dict[Path, str] = {}
-    for name in names:
+    for name in _options_of(command, output):
         path = getattr(options, name)
         if path and path.is_dir():
             raise ValueError(f"--{name} {path} is a folder; name a file")
@@ -148,10 +153,14 @@ def check_outputs(options: argparse.Namespace, *names: str) -> None:
                 raise ValueError(f"--{name} {path} is the file of --{first_name}, too; name another")
 
 
+def _options_of(command: argparse.ArgumentParser, *types: Callable[[str], Path]) -> list[str]:
+    return [action.dest for action in command._actions if action.type in types]
+
+
 def refuse_overwriting(options: argparse.Namespace, command: argparse.ArgumentParser) -> None:
     """Refuse by a ValueError a command that would write over a file that it reads."""
     given = vars(options)
-    written = [action.dest for action in command._actions if action.type is output]
+    written = _options_of(command, output, place)
     values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
     texts = [str(element) for value in values for element in value if isinstance(element, str | Path)]
     for name in written:

@@ -15,7 +15,6 @@ from flipproof.cli.arguments import (
     add_json,
     add_no_cache,
     check_guests,
-    check_outputs,
     count,
     output,
     read_scenario,
@@ -61,7 +60,6 @@ def add_checks(commands: Any) -> None:
 
 def command_diff(options: argparse.Namespace) -> int:
     """Print what differs; return 1 if anything does."""
-    check_outputs(options, "json")
     from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
 
     old, new = read_summary(options.old), read_summary(options.new)
@@ -87,7 +85,6 @@ def command_check(options: argparse.Namespace) -> int:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
     if options.tolerance is not None and options.baseline is None:
         raise ValueError(f"--tolerance {options.tolerance:g}: needs --baseline, whose findings it is allowed to move")
-    check_outputs(options, "junit", "json")
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check
 
@@ -189,7 +186,6 @@ def _compares_any_system(options: argparse.Namespace) -> bool:
 
 def _compare_curves(options: argparse.Namespace) -> int:
     """Compare two files of any system; return 1 if they differ, or cannot be compared at any time."""
-    check_outputs(options, "junit", "json", "plot")
     from flipproof.curves.compare import TOLERANCE, compare
     from flipproof.curves.files import read
 
@@ -226,7 +222,6 @@ def command_compare(options: argparse.Namespace) -> int:
         return _compare_curves(options)
     if options.junit and options.tolerance is None:
         raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
-    check_outputs(options, "junit", "json")
     from flipproof.check.comparison import claims, compare, table
     from flipproof.frame.solvers import find
     from flipproof.frame.timing import solve_timed

@@ -11,11 +11,11 @@ from typing import Any
 from flipproof.cli.arguments import (
     SCENARIO_HELP,
     add_command,
-    check_outputs,
     command_line,
     count,
     number,
     output,
+    place,
     positive,
     read_scenario,
     real,
@@ -91,7 +91,7 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
         "scale and clock are right",
     )  # fmt: skip
     command.add_argument(
-        "--out", type=output, metavar="DIR", help="folder for track.csv, figures, summary.json and page"
+        "--out", type=place, metavar="DIR", help="folder for track.csv, figures, summary.json and page"
     )
 
 
@@ -204,7 +204,6 @@ def command_export(options: argparse.Namespace) -> int:
     from flipproof.output.folder import write_text
     from slicemodel.trajectory import output_times
 
-    check_outputs(options, "out")
     scenario = read_scenario(options.scenario, options.slices)
     times = frame_times(scenario, options.frame_rate)
     solver = find(options.solver)

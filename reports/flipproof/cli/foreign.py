@@ -14,7 +14,6 @@ from flipproof.cli.arguments import (
     SCENARIO_HELP,
     add_command,
     add_json,
-    check_outputs,
     count,
     output,
     read_scenario,
@@ -128,7 +127,6 @@ def command_certify(options: argparse.Namespace) -> int:
 
     if options.equation is not None:
         check_equation(options.equation)
-    check_outputs(options, "json", "junit", "badge")
     names = ("name", "refined_by", "precision", "order")
     given = {name: value for name in names if (value := getattr(options, name)) is not None}
 

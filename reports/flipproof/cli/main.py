@@ -31,6 +31,7 @@ from flipproof.cli.arguments import (
     command_line,
     count,
     output,
+    place,
     read_scenario,
     refuse_overwriting,
     store_of,
@@ -156,6 +157,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         top.print_help()
         sys.exit(BAD_INPUT)
     refuse_overwriting(options, command)
+    check_outputs(options, command)
     return options
 
 
@@ -169,7 +171,7 @@ def parser() -> argparse.ArgumentParser:
 
     report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
     report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    report.add_argument("--out", type=output, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
+    report.add_argument("--out", type=place, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
     report.add_argument(
         "--quick", action="store_true", help="fewer refinements; no maps, engine certificates or paper figures"
     )
@@ -307,7 +309,6 @@ def command_simulate(options: argparse.Namespace) -> int:
     solver = find(options.solver)
     if options.steps is not None and solver.package != "slicemodel":
         raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
-    check_outputs(options, "out")
     settings = {} if options.steps is None else {"steps": options.steps}
     trajectory, seconds = solve_timed(solver.name, scenario, **settings)
     table = trajectory_csv(trajectory)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, output, read_scenario, reader, sides
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, place, read_scenario, reader, sides
 from flipproof.cli.progress import progress_bar
 from flipproof.cli.signals import INTERRUPTED
 
@@ -74,14 +74,14 @@ def command_waterfall(options: argparse.Namespace) -> int:
 
 def add_store(command: argparse.ArgumentParser) -> None:
     """Add what every command takes that fills a folder: where its rows go, who makes them, what they begin with."""
-    command.add_argument("--out", type=output, required=True, metavar="DIR", help="folder; holds a SQLite file of rows")
+    command.add_argument("--out", type=place, required=True, metavar="DIR", help="folder; holds a SQLite file of rows")
     where = command.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     where.add_argument(
         "--executor", type=_executor, metavar="MODULE:FACTORY", help="factory of the concurrent.futures.Executor to "
         "use; with an argument, MODULE:FACTORY@ARGUMENT; Dask: distributed:Client@tcp://127.0.0.1:8786",
     )  # fmt: skip
-    command.add_argument("--export", type=output, metavar="FILE", help="when complete, write all rows to a .csv or .nc")
+    command.add_argument("--export", type=place, metavar="FILE", help="when complete, write all rows to a .csv or .nc")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
