@@ -103,6 +103,7 @@ def test_models_lists_everything_with_reasons(capsys):
         (["fit", "a.csv", "--noise", "1e7"], ["'1e7' is not a number in (0, 1e6)"]),
         (["fit", "a.csv", "--minutes", "-1"], ["'-1' is not a number in (0, 1e6)"]),
         (["simulate", "--out", "nowhere/a.csv"], ["the folder nowhere does not exist"]),
+        (["bounce", "pymunk", "--plot", "a.pdf"], ["'a.pdf' is not a file that ends in .png or .svg"]),
         (["compare", "eq8", "missing.csv"], ["missing.csv is no file"]),
         (["compare", "eq8", "zzz"], ["solver 'zzz' is unknown", "known: "]),
         (["compare", "--scenario", "{bad}", "eq8", "eq8"], ["water_mass"]),

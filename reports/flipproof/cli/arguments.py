@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 from flipproof.cli.console import readable
 
 if TYPE_CHECKING:
+    from flipproof.figures.style import Drawing
     from flipproof.frame.findings import Finding
     from flipproof.frame.run_store import RunStore
 
@@ -129,6 +130,10 @@ def output(text: str) -> Path:
     return Path(text)
 
 
+picture = reader("a file that ends in .png or .svg", Path, lambda path: path.suffix in (".png", ".svg"))
+"""The same for a figure."""
+
+
 def place(text: str) -> Path:
     """Return the path of an option for a folder that a command makes, or for a file in it, which it checks itself."""
     return Path(text)
@@ -141,7 +146,7 @@ def check_outputs(options: argparse.Namespace, command: argparse.ArgumentParser)
     ``refuse_overwriting``.
     """
     taken: dict[Path, str] = {}
-    for name in _options_of(command, output):
+    for name in _options_of(command, output, picture):
         path = getattr(options, name)
         if path and path.is_dir():
             raise ValueError(f"--{name} {path} is a folder; name a file")
@@ -160,7 +165,7 @@ def _options_of(command: argparse.ArgumentParser, *types: Callable[[str], Path])
 def refuse_overwriting(options: argparse.Namespace, command: argparse.ArgumentParser) -> None:
     """Refuse by a ValueError a command that would write over a file that it reads."""
     given = vars(options)
-    written = _options_of(command, output, place)
+    written = _options_of(command, output, picture, place)
     values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
     texts = [str(element) for value in values for element in value if isinstance(element, str | Path)]
     for name in written:
@@ -198,6 +203,13 @@ def write_json(path: Path | None, mapping: Mapping[str, Any]) -> None:
         from flipproof.output.folder import write_text
 
         write_text(path, json.dumps(json_ready(mapping), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_picture(path: Path, drawing: Drawing) -> None:
+    """Write a figure into the file that ``--plot`` names, as its ending says."""
+    from flipproof.output.files import write_whole
+
+    write_whole(path.resolve(), drawing.png if path.suffix == ".png" else drawing.svg.encode())
 
 
 def write_junit(path: Path | None, findings: Sequence[Finding], suite: str) -> None:

@@ -17,11 +17,13 @@ from flipproof.cli.arguments import (
     check_guests,
     count,
     output,
+    picture,
     read_scenario,
     reader,
     store_of,
     write_json,
     write_junit,
+    write_picture,
 )
 from flipproof.figures.spoken import inert
 
@@ -147,7 +149,7 @@ def add_compare(commands: Any) -> None:
         "--shift", type=tolerance, metavar="S", help="time by which a jump may be early or late, beyond one output "
         "step and what the twins show",
     )  # fmt: skip
-    compare.add_argument("--plot", type=output, metavar="FILE.png", help="draw files' differences (.png or .svg)")
+    compare.add_argument("--plot", type=picture, metavar="FILE.png", help="draw files' differences (.png or .svg)")
     add_json(compare, "both curves' differences")
     compare.add_argument("--junit", type=output, metavar="FILE", help="write that verdict as JUnit XML, too")
 
@@ -195,8 +197,6 @@ def _compare_curves(options: argparse.Namespace) -> int:
         raise ValueError("--scenario is that of throws; these files may be of anything")
     if options.from_twins and options.tolerance is not None:
         raise ValueError("--from-twins and --tolerance exclude each other")
-    if options.plot and options.plot.suffix not in (".png", ".svg"):
-        raise ValueError(f"--plot {options.plot} ends neither in .png nor in .svg")
     first, second = (read(name, options.columns) for name in (options.first, options.second))
     twins, twins_of_b = ([read(path, options.columns) for path in paths] for paths in (options.twin, options.twin_of_b))
     allowed = None if options.from_twins else TOLERANCE if options.tolerance is None else options.tolerance
@@ -207,10 +207,9 @@ def _compare_curves(options: argparse.Namespace) -> int:
     write_json(options.json, comparison.to_mapping())
     write_junit(options.junit, comparison.findings, "flipproof compare")
     if options.plot:
-        from flipproof.curves.figure import picture
+        from flipproof.curves import figure
 
-        drawing = picture(comparison)
-        options.plot.write_bytes(drawing.png if options.plot.suffix == ".png" else drawing.svg.encode())
+        write_picture(options.plot, figure.picture(comparison))
     for line in comparison.lines:
         print(inert(line, lines=False))
     return 0 if comparison.passed else 1
