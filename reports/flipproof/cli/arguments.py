@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
-from flipproof.cli.console import readable
+from flipproof.cli.console import readable, say
 
 if TYPE_CHECKING:
     from flipproof.figures.style import Drawing
@@ -55,7 +55,7 @@ def store_of(options: argparse.Namespace) -> RunStore:
     from flipproof.frame.run_store import RunStore, default_place
 
     place = None if options.no_cache else default_place()
-    return RunStore(place, say=lambda words: print(f"flipproof: {words}", file=sys.stderr, flush=True))
+    return RunStore(place, say=say)
 
 
 def add_guests(command: argparse.ArgumentParser, purpose: str) -> None:

@@ -25,6 +25,7 @@ from flipproof.cli.arguments import (
     write_junit,
     write_picture,
 )
+from flipproof.cli.console import tell
 from flipproof.figures.spoken import inert
 
 tolerance = reader("a finite number of at least 0", float, lambda value: 0.0 <= value < math.inf)
@@ -92,12 +93,9 @@ def command_check(options: argparse.Namespace) -> int:
 
     allowed = TOLERANCE if options.tolerance is None else options.tolerance
 
-    def say(line: str) -> None:
-        print(inert(line, lines=False), flush=True)
-
     with store_of(options) as store:
         checked = check(
-            scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store,
+            scenario, groups, baseline=options.baseline, tolerance=allowed, say=tell, store=store,
             guests=options.guests, timeout=options.timeout,
         )  # fmt: skip
     write_junit(options.junit, checked.findings, "flipproof check")
@@ -211,7 +209,7 @@ def _compare_curves(options: argparse.Namespace) -> int:
 
         write_picture(options.plot, figure.picture(comparison))
     for line in comparison.lines:
-        print(inert(line, lines=False))
+        tell(line)
     return 0 if comparison.passed else 1
 
 
@@ -247,7 +245,7 @@ def command_compare(options: argparse.Namespace) -> int:
 
     comparison = compare(load(options.first), load(options.second))
     if flown:
-        print(inert(f"{' and '.join(dict.fromkeys(flown))}: N = {scenario.n_slices} slices", lines=False))
+        tell(f"{' and '.join(dict.fromkeys(flown))}: N = {scenario.n_slices} slices")
     print(inert(table(comparison)))
     allowed = math.inf if options.tolerance is None else options.tolerance
     findings = claims(comparison, allowed, "; ".join(stopped))
@@ -258,5 +256,5 @@ def command_compare(options: argparse.Namespace) -> int:
     first = findings[0]
     status = "FAIL" if first.failed else "PASS"
     size = "not judged" if first.value is None else f"{first.value:.6g} {first.unit}"
-    print(inert(f"{status}  {first.title}: {size}, tolerance {options.tolerance:g} ({first.note})", lines=False))
+    tell(f"{status}  {first.title}: {size}, tolerance {options.tolerance:g} ({first.note})")
     return 1 if first.failed else 0

@@ -39,7 +39,7 @@ from flipproof.cli.arguments import (
 )
 from flipproof.cli.bounce import add_bounce
 from flipproof.cli.check import add_checks, add_compare
-from flipproof.cli.console import readable, speak_plainly
+from flipproof.cli.console import readable, say, speak_plainly
 from flipproof.cli.film import add_film
 from flipproof.cli.foreign import add_foreign, add_models
 from flipproof.cli.landing import add_landing
@@ -133,7 +133,7 @@ def _words_of(error: OSError) -> str:
 
 def _complain(words: str, status: int) -> int:
     with suppress(OSError):  # the status says it where standard error does not take it
-        print(f"flipproof: error: {readable(words)}", file=sys.stderr, flush=True)
+        say(f"error: {readable(words)}")
     return status
 
 
@@ -262,7 +262,7 @@ def command_report(options: argparse.Namespace) -> int:
         import webbrowser
 
         if not webbrowser.open((options.out / "index.html").resolve().as_uri()):
-            print("flipproof: no browser could be opened", file=sys.stderr)
+            say("no browser could be opened")
     return 1 if report.failed else 0
 
 
@@ -317,9 +317,9 @@ def command_simulate(options: argparse.Namespace) -> int:
     else:
         sys.stdout.write(table)
     if not trajectory.ok:
-        print(f"flipproof: {solver.name}: {trajectory.status}: {trajectory.message}", file=sys.stderr)
+        say(f"{solver.name}: {trajectory.status}: {trajectory.message}")
     if words := doubt(trajectory, seconds):
-        print(f"flipproof: {words}", file=sys.stderr)
+        say(words)
     return 0 if trajectory.ok else 1
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, place, read_scenario, reader, sides
+from flipproof.cli.console import say
 from flipproof.cli.progress import progress_bar
 from flipproof.cli.signals import INTERRUPTED
 
@@ -97,9 +97,6 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
 
     stored = [0, 0]
 
-    def say(words: str) -> None:
-        print(f"flipproof: {words}", file=sys.stderr, flush=True)
-
     def begin(size: int) -> Callable[[int, int, bool], None]:
         bars.close()
         stored[:] = 0, size
@@ -124,7 +121,7 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
     except KeyboardInterrupt:
         # An interrupt may fall between the storing of rows and their counting, or before older rows were looked at.
         sentence = f"at least {stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
-        print(f"flipproof: interrupted; {sentence}the same command goes on from there", file=sys.stderr)
+        say(f"interrupted; {sentence}the same command goes on from there")
         return INTERRUPTED
     print(words)
     return 0
