@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -16,7 +15,7 @@ from flipproof.frame.chapter import Ask, Part, Size
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
 from flipproof.frame.gather import Gathered, Stages, evaluate, gather
-from flipproof.frame.pool import Progress, SerialExecutor, compile_kernels, workers
+from flipproof.frame.pool import Progress, SerialExecutor, compile_kernels
 from flipproof.frame.run_store import RunStore
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SCHEMA_NAME, schema_text, summarise, summary_text
@@ -69,21 +68,20 @@ def ask_of(
 
 def gather_report(
     ask: Ask,
+    pool: Executor,
     progress: Progress = lambda *_: None,
+    *,
     stages: Stages | None = None,
     store: RunStore | None = None,
-    pool: Executor | None = None,
-    *,
     contents: tuple[Part, ...] | None = None,
     work: Mapping[str, Any] | None = None,
 ) -> Gathered:
-    """Make every run of a report and study them, in a ``pool`` or by a worker process per core.
+    """Make every run of a report in a pool, and study them; ``contents`` are its parts, if not those of every report.
 
     Slow runs and calls are looked for in the ``store`` and kept there.
     """
-    with workers(None) if pool is None else nullcontext(pool) as executor:
-        compile_kernels(executor)
-        return gather(contents or parts(), ask, executor, progress, work=work, stages=stages, store=store)
+    compile_kernels(pool)
+    return gather(contents or parts(), ask, pool, progress, work=work, stages=stages, store=store)
 
 
 def build(

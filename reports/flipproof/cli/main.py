@@ -249,7 +249,9 @@ def command_report(options: argparse.Namespace) -> int:
         with store_of(options) as store, workers(options.jobs) as pool, ReportProgress(ask.size) as bar:
             contents = parts() if measurement is None else (part_measured(measurement), *parts())
             work = {"guests": guests} if guests else {}
-            gathered = gather_report(ask, bar.show, Stages(bar.begin), store, pool, contents=contents, work=work)
+            gathered = gather_report(
+                ask, pool, bar.show, stages=Stages(bar.begin), store=store, contents=contents, work=work
+            )
             facts = provenance(command_line()) | store.facts() | facts_of(guests)
             report = build(gathered, facts, store.remembering(pool), bar.show, png=options.png)
         write(report, folder)
