@@ -97,19 +97,15 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
 
     stored = [0, 0]
 
-    def begin(size: int) -> Callable[[int, int, bool], None]:
+    def begin(size: int) -> Callable[[int, int, int], None]:
         bars.close()
         stored[:] = 0, size
         show = bars.enter_context(progress_bar(options.out.name, "point", quiet=options.quiet))
-        without = before = 0
 
-        def progress(points: int, unfinished: int, made: bool) -> None:
-            nonlocal without, before
-            stored[0] += points
-            without += unfinished
-            before += 0 if made else points
-            show(stored[0], size, f"{without} without a whole flight" if without else "", before)
-            if stored[0] >= size:
+        def progress(done: int, without: int, before: int) -> None:
+            stored[0] = done
+            show(done, size, f"{without} without a whole flight" if without else "", before)
+            if done >= size:
                 bars.close()
 
         return progress
