@@ -80,7 +80,8 @@ def render(
     figures = {figure.name: figure for result in results.values() for figure in result.figures}
     regressions = [finding for finding in findings if finding.kind == "regression"]
     flown = gathered.result("flights")
-    facts = story(summary, {name: figure.table for name, figure in figures.items()})
+    maps = gathered.result("maps") or {}
+    facts = story(summary, maps["gamma"].result if "gamma" in maps else None)
     controls = sliders(gathered.ask.throw)
     context = dict(
         scenario=gathered.ask.scenario,

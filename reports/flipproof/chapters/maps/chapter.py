@@ -129,13 +129,16 @@ def exhibit(study: ValidityMap) -> Exhibit:
     )
 
 
+def nearest_cell(study: ValidityMap) -> tuple[int, int]:
+    """Return row and column of the cell that is nearest to the throw, as the map is drawn."""
+    fill, value = study.thrown
+    row = np.abs(_as_drawn(study.values, study.axis) - _as_drawn(value, study.axis)).argmin()
+    return int(row), int(np.abs(study.fills - fill).argmin())
+
+
 def _thrown_words(study: ValidityMap) -> str:
     """Return what the cross marks, and which share is largest in the nearest cell."""
-    if study.thrown is None:
-        return ""
-    column = int(np.abs(study.fills - study.thrown[0]).argmin())
-    row = int(np.abs(_as_drawn(study.values, study.axis) - _as_drawn(study.thrown[1], study.axis)).argmin())
-    k = int(study.dominant[row, column])
+    k = int(study.dominant[nearest_cell(study)])
     largest = f"; in the cell nearest to it the largest fair share is that of “{RUNGS[k]}”" if k >= 0 else ""
     return f" The cross is the throw of this report{largest}."
 
@@ -237,9 +240,8 @@ def figure_map(study: ValidityMap) -> Figure:
         handles += _contours(axes, study, error, name, colour)
     if logarithmic:
         axes.set_yscale("log")
-    if study.thrown is not None:
-        cross: dict[str, Any] = {"markersize": 10, "markeredgewidth": 2.5, "path_effects": HALO}
-        handles += axes.plot(*study.thrown, "x", color="#000000", label="this throw", zorder=5, **cross)
+    cross: dict[str, Any] = {"markersize": 10, "markeredgewidth": 2.5, "path_effects": HALO}
+    handles += axes.plot(*study.thrown, "x", color="#000000", label="this throw", zorder=5, **cross)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="fill fraction M_w / M_max [1]", ylabel=LABELS[study.axis])
     axes.grid(visible=False)
     title = f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)"
