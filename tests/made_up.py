@@ -50,7 +50,7 @@ def command(capsys, *arguments):
 
 def action(*arguments):
     """Run a command as the command line does, but let its exceptions through."""
-    options = cli.parser().parse_args([str(argument) for argument in arguments])
+    options = cli.parse([str(argument) for argument in arguments])
     return options.action(options)
 
 

@@ -1,7 +1,6 @@
 """The house rules that can be executed: who imports whom, and what start-up may load."""
 
 import ast
-import re
 import subprocess
 import sys
 from functools import cache
@@ -101,30 +100,11 @@ def test_the_slice_model_imports_no_other_room():
 
 
 def test_nouns_know_no_verb():
-    """Nor does the landing, which is read off a trajectory too, but which no solver needs."""
-    for noun in (*NOUNS, "landing"):
+    """Nor does a helper, nor the landing, which is read off a trajectory too, but which no solver needs."""
+    for noun in (*NOUNS, *HELPERS, "landing"):
         for module, names in imports_of(ROOT / "slicemodel" / f"{noun}.py"):
             if module.startswith("slicemodel"):
                 assert module.partition(".")[2] in NOUNS, f"{noun} imports {module} {names}"
-
-
-def test_text_is_cut_by_one_function():
-    """A text that is cut at a number of characters ends inside a word; ``shortened`` ends it between two."""
-    for file in (file for room in ROOMS for file in files_of(room)):
-        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
-            result = re.search(r"(?<!hexdigest\(\))\[:\d\d+\]|\[-\d\d\d+:\]|!r:\.\d", line)
-            assert not result, f"{file.name}, line {number}: {line.strip()}"
-
-
-@pytest.mark.parametrize("room", ROOMS)
-def test_every_room_says_that_it_is_typed(room):
-    assert (folder_of(room) / "py.typed").is_file()
-
-
-def test_helpers_know_nothing_of_the_model():
-    for helper in HELPERS:
-        for module, _ in imports_of(ROOT / "slicemodel" / f"{helper}.py"):
-            assert not module.startswith(ROOMS), f"{helper} imports {module}"
 
 
 def test_start_up_is_light():
@@ -145,15 +125,6 @@ def test_tests_that_share_a_fixture_are_kept_in_one_process(request):
     """As the README's command runs them: xdist tells its scheduler the group at the end of a test's name."""
     grouped = getattr(request.config.option, "loadgroup", False)
     assert request.node.nodeid.endswith("@test_architecture") == grouped
-
-
-def test_a_relative_tolerance_says_what_holds_near_zero():
-    """``approx`` adds 1e-12 to every relative tolerance, which is a lot of a moment of inertia; say 0 or how much."""
-    for file in files_of("tests"):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) == "approx":
-                given = {keyword.arg for keyword in node.keywords}
-                assert "rel" not in given or "abs" in given, f"{file}:{node.lineno}: approx with rel and without abs"
 
 
 def test_the_frame_knows_no_subject_and_chapters_are_named_once():

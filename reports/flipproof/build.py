@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +15,7 @@ from flipproof.frame.chapter import Ask, Part, Size
 from flipproof.frame.exhibit import Exhibit, drawn
 from flipproof.frame.findings import Finding
 from flipproof.frame.gather import Gathered, Stages, evaluate, gather
-from flipproof.frame.pool import Progress, SerialExecutor, compile_kernels, workers
+from flipproof.frame.pool import Progress, SerialExecutor, compile_kernels
 from flipproof.frame.run_store import RunStore
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SCHEMA_NAME, schema_text, summarise, summary_text
@@ -33,7 +32,6 @@ class Report:
     """A finished report in memory; ``tables`` maps paths in its folder to the text of files.
 
     ``pages`` are the files ``index.html``, the story, and ``evidence.html``, by their names.
-    ``seconds`` are wall times [s]: of every claim, by its finding's id; ``whole`` is that of everything.
     """
 
     findings: tuple[Finding, ...]
@@ -41,8 +39,6 @@ class Report:
     pages: Mapping[str, str]
     summary: dict[str, Any]
     tables: dict[str, str]
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    whole: float | None = None
 
     @property
     def failed(self) -> tuple[Finding, ...]:
@@ -72,21 +68,20 @@ def ask_of(
 
 def gather_report(
     ask: Ask,
+    pool: Executor,
     progress: Progress = lambda *_: None,
+    *,
     stages: Stages | None = None,
     store: RunStore | None = None,
-    pool: Executor | None = None,
-    *,
     contents: tuple[Part, ...] | None = None,
     work: Mapping[str, Any] | None = None,
 ) -> Gathered:
-    """Make every run of a report and study them, in a ``pool`` or by a worker process per core.
+    """Make every run of a report in a pool, and study them; ``contents`` are its parts, if not those of every report.
 
     Slow runs and calls are looked for in the ``store`` and kept there.
     """
-    with workers(None) if pool is None else nullcontext(pool) as executor:
-        compile_kernels(executor)
-        return gather(contents or parts(), ask, executor, progress, work=work, stages=stages, store=store)
+    compile_kernels(pool)
+    return gather(contents or parts(), ask, pool, progress, work=work, stages=stages, store=store)
 
 
 def build(
@@ -125,25 +120,21 @@ def build(
         pages=pages,
         summary=summary,
         tables={path: text for result in present for path, text in result.chapter.tables(result.study_result).items()},
-        seconds={id_: seconds for result in results.values() for id_, seconds in result.seconds.items()},
-        whole=sum(gathered.stages.seconds.values()),
     )
 
 
 def write(report: Report, folder: Path) -> None:
     """Write a finished report into an empty folder."""
-    files: dict[str, str | bytes | None] = {
+    files: dict[str, str | bytes] = {
         **report.pages,
         "summary.json": summary_text(report.summary),
         SCHEMA_NAME: schema_text(),
-        "junit.xml": junit_text(report.findings, seconds=report.seconds, whole=report.whole),
+        "junit.xml": junit_text(report.findings, seconds=sum(report.summary["stages"].values())),
         **report.tables,
     }
     for exhibit in report.exhibits:
-        contents = {"svg": exhibit.drawing.svg, "png": exhibit.drawing.png or None, "csv": exhibit.table}
-        files |= {f"figures/{exhibit.name}.{kind}": content for kind, content in contents.items()}
+        files |= {f"figures/{name}": content for name, content in exhibit.files().items()}
     for path, content in files.items():
-        if content is not None:
-            place = folder / path
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+        place = folder / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))

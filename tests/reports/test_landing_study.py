@@ -501,6 +501,7 @@ def test_the_sweep_makes_the_same(found, swept):
     assert said[0].startswith("aims: ")
     assert (out / "upright.csv").read_text(encoding="utf-8") == shares_csv(found)
     assert len(list(out.glob("*.svg"))) == len(list(out.glob("*.png"))) == 3
+    assert (out / "landing-map.csv").read_text(encoding="utf-8") == map_csv(found)
 
 
 def test_the_sweep_goes_on(found, copied):

@@ -1,7 +1,6 @@
 """Maps and waterfalls made by a sweep: the numbers of direct runs, whatever happened to the program in between."""
 
 import csv
-import json
 import sqlite3
 import subprocess
 import sys
@@ -14,6 +13,7 @@ import pytest
 from made_up import command as run
 from made_up import refused, study_map
 
+from flipproof.chapters.maps.chapter import exhibit
 from flipproof.chapters.maps.study import CURVE, RUNGS
 from flipproof.chapters.waterfall.study import OBSERVABLES, observe, split_all
 from flipproof.figures.style import Drawing
@@ -25,13 +25,10 @@ from flipproof.presets.planned import (
     LANDS_AT,
     READ_OFF,
     MapPlan,
-    map_csv,
-    map_facts,
     plan_split,
     points_of,
     read_runs,
     split_rows,
-    waterfall_csv,
 )
 from flipproof.sweep.design import design_of
 from flipproof.sweep.errors import SweepError
@@ -105,7 +102,7 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
         if there < 20 * 42:
             break
     assert 0 < there < 20 * 42
-    assert not (killed / "map.png").exists()
+    assert not (killed / "map-gamma.png").exists()
     with monkeypatch.context() as patch:
         patch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(SerialExecutor()))
         status, out, _ = run(capsys, *options, "--out", killed)
@@ -113,7 +110,7 @@ def test_a_map_killed_midway_goes_on_to_the_rows_and_the_picture_of_an_undisturb
         assert f"; {there} were there\ncells by largest fair share of omega/omega_0, " in out
         assert run(capsys, *options, "--out", tmp_path / "whole")[0] == 0
     assert stored(killed) == stored(tmp_path / "whole")
-    for name in ("map.svg", "map.png", "map.csv", "map.json"):
+    for name in ("map-gamma.svg", "map-gamma.png", "map-gamma.csv"):
         assert (killed / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
@@ -132,46 +129,38 @@ def stored(folder):
 def test_a_finished_map_is_only_drawn_again(tmp_path, capsys, monkeypatch):
     options = ["map", "--axis", "restitution", "--size", "2x2", "--slices", "2", "--out", tmp_path / "out"]
     assert run(capsys, *options)[0] == 0
-    drawn = (tmp_path / "out" / "map.svg").read_bytes()
-    (tmp_path / "out" / "map.svg").unlink()
+    drawn = (tmp_path / "out" / "map-restitution.svg").read_bytes()
+    (tmp_path / "out" / "map-restitution.svg").unlink()
     monkeypatch.setattr("flipproof.sweep.command.processes", lambda _: nullcontext(None))
     status, out, err = run(capsys, *options, "--export", tmp_path / "out" / "rows.csv")
     assert (status, err) == (0, "")
     assert "; 206 were there" in out
-    assert (tmp_path / "out" / "map.svg").read_bytes() == drawn
-    assert (tmp_path / "out" / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "out" / "map-restitution.svg").read_bytes() == drawn
+    assert (tmp_path / "out" / "map-restitution.png").read_bytes().startswith(b"\x89PNG")
     assert len((tmp_path / "out" / "rows.csv").read_text().splitlines()) == 207
 
 
-def test_table_and_contours_say_what_the_map_holds(tmp_path):
+def test_the_table_of_a_map_says_what_it_holds(tmp_path):
     plan = MapPlan.of_size(THROW, "gamma", 3, 3)
     study = by_hand(plan, tmp_path / "out")
-    rows = list(csv.DictReader(map_csv(study).splitlines()))
+    rows = list(csv.DictReader(exhibit(study).table.splitlines()))
     assert len(rows) == 9
     for row, at in zip(rows, np.ndindex(3, 3), strict=True):
-        assert float(row["fill_fraction"]) == study.fills[at[1]]
-        assert float(row["gamma/omega0"]) == study.values[at[0]]
-        assert float(row["plateau eq8"]) == study.level["eq8"][at]
-        assert float(row["plateau rods"]) == study.level["rods"][at]
-        assert float(row["fair share of gravity in Eq. 8"]) == study.shares[RUNGS.index("gravity in Eq. 8")][at]
+        numbers = {
+            "fill fraction [1]": study.fills[at[1]],
+            "damping rate gamma / omega_0 [1]": study.values[at[0]],
+            "plateau of omega/omega_0 eq8 [1]": study.level["eq8"][at],
+            "plateau of omega/omega_0 rods [1]": study.level["rods"][at],
+            "fair share of gravity in Eq. 8 [1]": study.shares[RUNGS.index("gravity in Eq. 8")][at],
+            "largest difference of eq8 from free-flight [1]": study.largest["eq8"][at],
+            "step error of published-python [1]": study.step_error["published-python"][at],
+        }
+        assert {name: float(row[name]) for name in numbers} == pytest.approx(numbers, rel=1e-8, abs=0.0)
         assert row["largest fair share"] == ("" if study.dominant[at] < 0 else RUNGS[study.dominant[at]])
-        assert row["reason"] == ""
-    facts = json.loads(json.dumps(map_facts(study, THROW), allow_nan=False))
-    assert sum(facts["cells by largest fair share"].values()) + facts["cells undecided"] == 9
+        assert row["not computed because"] == ""
     *_, second, first = np.sort(np.abs(study.shares), axis=0)
-    assert facts["cells undecided"] == int(((first < 1e-4) | (first - second < study.band)).sum()) > 0
-    assert [(contour["of"], contour["level"]) for contour in facts["contours"]] == [
-        (of, level) for of in ("error of published-python", "change by overlap") for level in (0.01, 0.1)
-    ]
-    shown = {"error of published-python": study.error, "change by overlap": abs(study.overlap)}
-    for contour in facts["contours"]:
-        error = shown[contour["of"]]
-        assert contour["cells above"] == (error >= contour["level"]).sum()
-        for line in contour["lines"]:
-            for filling, value in line:
-                assert study.fills[0] <= filling <= study.fills[-1]
-                assert study.values[0] <= value <= study.values[-1] * (1 + 1e-12)
-    assert any(contour["lines"] for contour in facts["contours"])
+    undecided = int(((first < 1e-4) | (first - second < study.band)).sum())
+    assert undecided == 9 - sum(bool(row["largest fair share"]) for row in rows) > 0
 
 
 def test_a_run_that_is_not_whole_leaves_a_reason_in_its_cell(tmp_path):
@@ -191,8 +180,8 @@ def test_a_run_that_is_not_whole_leaves_a_reason_in_its_cell(tmp_path):
     assert (study.dominant == -1).all()
     assert np.isnan(study.level["eq8"][:, 0]).all()
     assert np.isfinite(study.level["eq8"][:, 1]).all()
-    assert '"eq8: stalled"' not in map_csv(study)
-    assert json.dumps(map_facts(study, THROW), allow_nan=False)
+    row = next(csv.DictReader(exhibit(study).table.splitlines()))
+    assert (row["plateau of omega/omega_0 eq8 [1]"], row["not computed because"]) == ("", "eq8: stalled")
 
 
 def test_a_run_that_the_store_lacks_is_noticed(tmp_path):
@@ -220,7 +209,6 @@ def test_a_waterfall_from_rows_is_that_of_direct_runs_to_the_last_bit(split):
     direct = split_all(runs[0], {r: observe(make(r).whole) for r in runs})
     assert [part.observable.name for part in direct] == [observable.name for observable in OBSERVABLES]
     assert split_rows(rows) == direct
-    assert len(waterfall_csv(direct).splitlines()) == 1 + len(direct) * (3 + len(direct[0].bars))
 
 
 def test_a_waterfall_s_run_that_is_not_whole_is_named(split):
@@ -242,8 +230,11 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     assert f"{runs} points" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").stat().st_size > 10_000
+        table = (tmp_path / "out" / f"waterfall-{observable.name}.csv").read_text().splitlines()
+        assert f"mean of all orders [{observable.unit}]" in table[0]
+        assert len(table) == 4 + len(RUNGS)
     drawn = Drawing("<svg/>", b"anew")
-    monkeypatch.setattr("flipproof.presets.planned.draw", lambda _: drawn)
+    monkeypatch.setattr("flipproof.frame.exhibit.draw", lambda _: drawn)
     status, out, _ = run(capsys, *options)
     assert f"; {runs} were there" in out
     for observable in OBSERVABLES:

@@ -299,7 +299,7 @@ def test_a_lock_in_a_folder_that_everybody_may_write_is_refused(tmp_path):
     beside = tmp_path / f"latest{UNFINISHED}"
     beside.mkdir()
     beside.chmod(0o777)
-    refused("every user", tmp_path / "latest")
+    refused("may be written by other users; run chmod go-w on it", tmp_path / "latest")
 
 
 def test_a_planted_part_file_is_not_written_to(tmp_path):

@@ -3,12 +3,21 @@
 import html
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from made_up import page_of
 
+from flipproof.build import ask_of
+from flipproof.chapters import chapters_named
 from flipproof.chapters.agreement.chapter import UP_TO
+from flipproof.chapters.maps.study import RUNGS, Reading, plan_map, study_readings
+from flipproof.figures.style import Drawing
 from flipproof.frame.equations import NAMES
+from flipproof.frame.flights import Flights, Outcome
+from flipproof.frame.gather import Gathered, Stages
 from flipproof.page.glossary import TERMS, anchor, linked
 from flipproof.page.live import sliders
 from flipproof.page.parts import STORY
@@ -125,7 +134,7 @@ def test_what_the_snapshot_found_is_told_in_full():
     ]
     solvers = [{"name": solver, "plateau": 0.3} for solver in SOLVERS]
     kept = json.loads(KEPT.read_text(encoding="utf-8")) | {"solvers": solvers, "paper": {"experiment": experiment}}
-    told = story(kept, {})
+    told = story(kept)
     assert [name for name, number in vars(told.n).items() if number is None] == []
     names = ["The time step", "The formulas of the program", "The physics of Eq. 8"]
     assert [layer.name for layer in told.layers] == names
@@ -140,7 +149,7 @@ def test_what_the_snapshot_found_is_told_in_full():
 
 
 def test_a_summary_with_nothing_in_it_tells_no_numbers():
-    told = story({}, {})
+    told = story({})
     assert told.layers == told.shares == told.nearest == []
     assert told.map is None
     assert [number for name, number in vars(told.n).items() if number is not None and number.value] == []
@@ -150,7 +159,7 @@ def test_a_summary_with_nothing_in_it_tells_no_numbers():
     ("names", "told"), [("free-flight, solve_ivp, pymunk, mujoco", True), ("free-flight, solve_ivp", False)]
 )
 def test_an_agreement_without_the_engines_is_not_told_as_theirs(names, told):
-    found = story({"findings": [{"id": "agreement", "title": f"{names}: all agree", "value": 3e-4}]}, {})
+    found = story({"findings": [{"id": "agreement", "title": f"{names}: all agree", "value": 3e-4}]})
     assert (found.n.agreement is not None) == told
     assert (found.engines.count, found.engines.names) == ("two", "pymunk and MuJoCo")
 
@@ -158,7 +167,7 @@ def test_an_agreement_without_the_engines_is_not_told_as_theirs(names, told):
 @pytest.mark.parametrize(("band", "vague"), [(0.009, False), (0.2, True), (None, False)])
 def test_an_agreement_that_its_uncertainty_hides_is_said_to_be_vague(band, vague):
     title = "free-flight, solve_ivp, pymunk, mujoco: all agree within their bands"
-    found = story({"findings": [{"id": "agreement", "title": title, "value": 1e-3, "band": band}]}, {})
+    found = story({"findings": [{"id": "agreement", "title": title, "value": 1e-3, "band": band}]})
     assert found.engines.vague is vague
 
 
@@ -166,7 +175,7 @@ def test_an_agreement_before_the_end_of_the_flight_says_up_to_when():
     title = "free-flight, solve_ivp, pymunk, mujoco: all agree within their bands"
     for until in ("", "193 ms"):
         words = f"{title}{UP_TO}{until}" if until else title
-        found = story({"findings": [{"id": "agreement", "title": words, "value": 3e-4}]}, {})
+        found = story({"findings": [{"id": "agreement", "title": words, "value": 3e-4}]})
         assert found.engines.until == until
 
 
@@ -213,3 +222,39 @@ def test_the_first_appearance_of_a_term_is_a_link_and_nothing_inside_a_link_or_a
 def test_evidence_links_its_words(report):
     body = re.search(r'<section id="steps".*?</section>', report.pages["evidence.html"], re.S).group()
     assert body.count('class="term"') > 3
+
+
+def test_the_story_draws_the_map_of_bottles_as_it_was_computed():
+    """Small reports have no maps: this one has nothing else."""
+    throw = Scenario().with_slices(4)
+    fills, dampings = (0.3, 0.6, 0.9), (0.02, 0.1, 0.5)
+    lost = next(run for run in plan_map(throw, "gamma", fills, dampings) if run.solver == "eq8")
+    readings = {
+        run: Reading(level=len(run.solver) / 64 + run.scenario.fill_fraction / 8 + run.scenario.damping_rate / 512)
+        for run in plan_map(throw, "gamma", fills, dampings)
+        if run != lost
+    }
+    shares = np.zeros((len(RUNGS), 3, 3))
+    for k, at in enumerate(np.ndindex(3, 3)):
+        shares[k % len(RUNGS), *at] = 0.1
+    shares[:, 0, 0] = np.nan
+    study = replace(study_readings(throw, "gamma", fills, dampings, readings), shares=shares)
+    outcome = Outcome({"gamma": Outcome(study), "step": Outcome(None, "no memory")})
+    ask = ask_of(throw, "full")
+    gathered = Gathered(
+        ask=ask, parts=chapters_named("maps"), outcomes={"maps": outcome}, flights=Flights({}), stages=Stages()
+    )
+    pages = page_of(gathered, Drawing("<svg/>", b""))
+    drawn = json.loads(re.search(r'id="map-data">(.*?)</script>', pages["index.html"], re.S).group(1))
+    assert (drawn["fills"], drawn["dampings"]) == (list(fills), list(dampings))
+    assert drawn["solvers"] == ["published-python", "eq8", "free-flight"]
+    assert drawn["numbers"] == {name: k for k, name in enumerate(RUNGS, start=1)}
+    assert drawn["thrown"] == pytest.approx([throw.fill_fraction, throw.damping_rate / throw.omega0])
+    assert len(drawn["cells"]) == 9
+    for cell in drawn["cells"]:
+        at = dampings.index(cell["y"]), fills.index(cell["x"])
+        assert cell["which"] == ("" if at == (0, 0) else RUNGS[(3 * at[0] + at[1]) % len(RUNGS)])
+        means = [pytest.approx(study.level[name][at], abs=1e-8, rel=0.0) for name in drawn["solvers"]]
+        assert cell["mean"] == ([means[0], None, means[2]] if at == (0, 0) else means)
+    # Of 0.25 the nearest in ratio is 0.5, not 0.1: drags are drawn in equal ratios.
+    assert drawn["here"] == RUNGS[(3 * 2 + 1) % len(RUNGS)]

@@ -404,6 +404,12 @@ def test_a_file_of_another_shape_is_renewed_at_once(swept, tmp_path, statement):
         assert found == rows
 
 
+def test_a_sticky_bit_makes_no_folder_private(tmp_path):
+    tmp_path.chmod(0o1777)
+    with pytest.raises(OSError, match="may be written by other users"):
+        Store(tmp_path / "sweep.sqlite")
+
+
 @pytest.mark.parametrize("end", ["-journal", "-wal", "-shm"])
 @pytest.mark.parametrize("planted", ["fifo", "link", "notes"])
 def test_what_was_planted_beside_the_file_is_refused_and_left_alone(swept, tmp_path, end, planted):

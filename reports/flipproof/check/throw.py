@@ -15,10 +15,9 @@ computed again, or is not in the baseline, is said, not passed over.
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -47,7 +46,6 @@ from slicemodel import Scenario
 class Checked:
     """The claims that were checked, and the baseline's findings that were not.
 
-    ``seconds`` are the wall times that the claims took [s], by their ids; the first of a group has that of its runs.
     ``own`` counts the claims that are tried on flipproof's own throws, or on the paper's formulas; ``unknown`` are
     findings that the baseline does not have.
     """
@@ -55,7 +53,6 @@ class Checked:
     findings: tuple[Finding, ...]
     left_out: tuple[str, ...]
     unknown: tuple[str, ...] = ()
-    seconds: Mapping[str, float] = field(default_factory=dict)
     own: int = 0
 
     @property
@@ -115,13 +112,11 @@ def check(
     throw = scenario.with_slices(slices)
     findings: list[Finding] = []
     unknown: list[str] = []
-    seconds: dict[str, float] = {}
     tasks: list[tuple[str, tuple[Guest, ...]]] = [(group, ()) for group in groups]
     tasks += [("guests", invited(guests, timeout))] if guests else []
-    began, own = time.perf_counter(), 0
+    own = 0
     for group, invited_guests in tasks:
         for finding in findings_of(group, throw, store, invited_guests):
-            began, seconds[finding.id] = time.perf_counter(), time.perf_counter() - began
             was = old_findings.get(finding.id)
             moves = group == "thresholds" or (group == "guests" and finding.kind != "regression")
             if moves and was is None:
@@ -137,7 +132,7 @@ def check(
             say(line(held, needs))
     recomputed = {finding.id for finding in findings}
     left_out = tuple(name for name in old_findings if name not in recomputed) if "thresholds" in groups else ()
-    return Checked(findings=tuple(findings), left_out=left_out, unknown=tuple(unknown), seconds=seconds, own=own)
+    return Checked(findings=tuple(findings), left_out=left_out, unknown=tuple(unknown), own=own)
 
 
 def line(finding: Finding, needs: str) -> str:

@@ -12,9 +12,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
-from flipproof.cli.console import readable
+from flipproof.cli.console import readable, say
 
 if TYPE_CHECKING:
+    from flipproof.figures.style import Drawing
     from flipproof.frame.findings import Finding
     from flipproof.frame.run_store import RunStore
 
@@ -54,7 +55,7 @@ def store_of(options: argparse.Namespace) -> RunStore:
     from flipproof.frame.run_store import RunStore, default_place
 
     place = None if options.no_cache else default_place()
-    return RunStore(place, say=lambda words: print(f"flipproof: {words}", file=sys.stderr, flush=True))
+    return RunStore(place, say=say)
 
 
 def add_guests(command: argparse.ArgumentParser, purpose: str) -> None:
@@ -125,18 +126,27 @@ real = reader("a number", float, lambda _: True)
 
 
 def output(text: str) -> Path:
-    """Return the path of an option that a command writes: by this type ``refuse_overwriting`` knows such options."""
+    """Return the path of an option for a file that a command writes; ``check_outputs`` knows it by this type."""
     return Path(text)
 
 
-def check_outputs(options: argparse.Namespace, *names: str) -> None:
+picture = reader("a file that ends in .png or .svg", Path, lambda path: path.suffix in (".png", ".svg"))
+"""The same for a figure."""
+
+
+def place(text: str) -> Path:
+    """Return the path of an option for a folder that a command makes, or for a file in it, which it checks itself."""
+    return Path(text)
+
+
+def check_outputs(options: argparse.Namespace, command: argparse.ArgumentParser) -> None:
     """Refuse by a ValueError, before the work begins, files of options that could not be written after it.
 
     No two options may name one file; a device or a pipe takes both. What the command reads is kept by
     ``refuse_overwriting``.
     """
     taken: dict[Path, str] = {}
-    for name in names:
+    for name in _options_of(command, output, picture):
         path = getattr(options, name)
         if path and path.is_dir():
             raise ValueError(f"--{name} {path} is a folder; name a file")
@@ -148,10 +158,14 @@ def check_outputs(options: argparse.Namespace, *names: str) -> None:
                 raise ValueError(f"--{name} {path} is the file of --{first_name}, too; name another")
 
 
+def _options_of(command: argparse.ArgumentParser, *types: Callable[[str], Path]) -> list[str]:
+    return [action.dest for action in command._actions if action.type in types]
+
+
 def refuse_overwriting(options: argparse.Namespace, command: argparse.ArgumentParser) -> None:
     """Refuse by a ValueError a command that would write over a file that it reads."""
     given = vars(options)
-    written = [action.dest for action in command._actions if action.type is output]
+    written = _options_of(command, output, picture, place)
     values = [value if isinstance(value, list) else [value] for name, value in given.items() if name not in written]
     texts = [str(element) for value in values for element in value if isinstance(element, str | Path)]
     for name in written:
@@ -191,15 +205,20 @@ def write_json(path: Path | None, mapping: Mapping[str, Any]) -> None:
         write_text(path, json.dumps(json_ready(mapping), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def write_junit(
-    path: Path | None, findings: Sequence[Finding], suite: str, seconds: Mapping[str, float] | None = None
-) -> None:
+def write_picture(path: Path, drawing: Drawing) -> None:
+    """Write a figure into the file that ``--plot`` names, as its ending says."""
+    from flipproof.output.files import write_whole
+
+    write_whole(path.resolve(), drawing.png if path.suffix == ".png" else drawing.svg.encode())
+
+
+def write_junit(path: Path | None, findings: Sequence[Finding], suite: str) -> None:
     """Write findings as JUnit XML into the file that ``--junit`` names, if any."""
     if path is not None:
         from flipproof.output.folder import write_text
         from flipproof.output.junit import junit_text
 
-        write_text(path, junit_text(findings, suite, seconds))
+        write_text(path, junit_text(findings, suite))
 
 
 def command_line() -> str:

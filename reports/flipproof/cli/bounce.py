@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flipproof.cli.arguments import add_command, add_json, check_outputs, output, real, write_json
+from flipproof.cli.arguments import add_command, add_json, picture, real, write_json, write_picture
 from flipproof.cli.progress import progress_bar
 from flipproof.figures.spoken import inert
 
@@ -23,7 +23,7 @@ def add_bounce(commands: Any) -> None:
     bounce.add_argument("--dt", type=real, default=1e-3, metavar="S", help="step in seconds (default 0.001)")
     add_json(bounce, "the passports")
     bounce.add_argument(
-        "--plot", type=output, metavar="FILE.png", help="draw the passports, one row per engine (.png or .svg)"
+        "--plot", type=picture, metavar="FILE.png", help="draw the passports, one row per engine (.png or .svg)"
     )
 
 
@@ -32,9 +32,6 @@ def command_bounce(options: argparse.Namespace) -> int:
     from flipproof.bounce.passport import passport
     from flipproof.bounce.specs import load
 
-    check_outputs(options, "json", "plot")
-    if options.plot and options.plot.suffix not in (".png", ".svg"):
-        raise ValueError(f"--plot {options.plot} ends neither in .png nor in .svg")
     passports = []
     for adapter in map(load, options.adapter):
         print(inert(adapter.name) + f", step {options.dt:g} s")
@@ -47,8 +44,7 @@ def command_bounce(options: argparse.Namespace) -> int:
                 print(inert(f"  {'':<14} {measurement.remark}"))
     write_json(options.json, {"passports": [made.to_mapping() for made in passports]})
     if options.plot:
-        from flipproof.bounce.figure import picture
+        from flipproof.bounce import figure
 
-        drawing = picture(passports)
-        options.plot.write_bytes(drawing.png if options.plot.suffix == ".png" else drawing.svg.encode())
+        write_picture(options.plot, figure.picture(passports))
     return 0

@@ -15,15 +15,17 @@ from flipproof.cli.arguments import (
     add_json,
     add_no_cache,
     check_guests,
-    check_outputs,
     count,
     output,
+    picture,
     read_scenario,
     reader,
     store_of,
     write_json,
     write_junit,
+    write_picture,
 )
+from flipproof.cli.console import tell
 from flipproof.figures.spoken import inert
 
 tolerance = reader("a finite number of at least 0", float, lambda value: 0.0 <= value < math.inf)
@@ -61,7 +63,6 @@ def add_checks(commands: Any) -> None:
 
 def command_diff(options: argparse.Namespace) -> int:
     """Print what differs; return 1 if anything does."""
-    check_outputs(options, "json")
     from flipproof.check.diff import TOLERANCE, compare_summaries, read_summary
 
     old, new = read_summary(options.old), read_summary(options.new)
@@ -87,21 +88,17 @@ def command_check(options: argparse.Namespace) -> int:
         raise ValueError("--only thresholds: needs --baseline, the summary.json of a report of this throw")
     if options.tolerance is not None and options.baseline is None:
         raise ValueError(f"--tolerance {options.tolerance:g}: needs --baseline, whose findings it is allowed to move")
-    check_outputs(options, "junit", "json")
     from flipproof.check.diff import TOLERANCE
     from flipproof.check.throw import check
 
     allowed = TOLERANCE if options.tolerance is None else options.tolerance
 
-    def say(line: str) -> None:
-        print(inert(line, lines=False), flush=True)
-
     with store_of(options) as store:
         checked = check(
-            scenario, groups, baseline=options.baseline, tolerance=allowed, say=say, store=store,
+            scenario, groups, baseline=options.baseline, tolerance=allowed, say=tell, store=store,
             guests=options.guests, timeout=options.timeout,
         )  # fmt: skip
-    write_junit(options.junit, checked.findings, "flipproof check", checked.seconds)
+    write_junit(options.junit, checked.findings, "flipproof check")
     write_json(
         options.json,
         {"findings": [finding.to_mapping() for finding in checked.findings], "conclusion": checked.conclusion},
@@ -150,7 +147,7 @@ def add_compare(commands: Any) -> None:
         "--shift", type=tolerance, metavar="S", help="time by which a jump may be early or late, beyond one output "
         "step and what the twins show",
     )  # fmt: skip
-    compare.add_argument("--plot", type=output, metavar="FILE.png", help="draw files' differences (.png or .svg)")
+    compare.add_argument("--plot", type=picture, metavar="FILE.png", help="draw files' differences (.png or .svg)")
     add_json(compare, "both curves' differences")
     compare.add_argument("--junit", type=output, metavar="FILE", help="write that verdict as JUnit XML, too")
 
@@ -189,7 +186,6 @@ def _compares_any_system(options: argparse.Namespace) -> bool:
 
 def _compare_curves(options: argparse.Namespace) -> int:
     """Compare two files of any system; return 1 if they differ, or cannot be compared at any time."""
-    check_outputs(options, "junit", "json", "plot")
     from flipproof.curves.compare import TOLERANCE, compare
     from flipproof.curves.files import read
 
@@ -199,8 +195,6 @@ def _compare_curves(options: argparse.Namespace) -> int:
         raise ValueError("--scenario is that of throws; these files may be of anything")
     if options.from_twins and options.tolerance is not None:
         raise ValueError("--from-twins and --tolerance exclude each other")
-    if options.plot and options.plot.suffix not in (".png", ".svg"):
-        raise ValueError(f"--plot {options.plot} ends neither in .png nor in .svg")
     first, second = (read(name, options.columns) for name in (options.first, options.second))
     twins, twins_of_b = ([read(path, options.columns) for path in paths] for paths in (options.twin, options.twin_of_b))
     allowed = None if options.from_twins else TOLERANCE if options.tolerance is None else options.tolerance
@@ -211,12 +205,11 @@ def _compare_curves(options: argparse.Namespace) -> int:
     write_json(options.json, comparison.to_mapping())
     write_junit(options.junit, comparison.findings, "flipproof compare")
     if options.plot:
-        from flipproof.curves.figure import picture
+        from flipproof.curves import figure
 
-        drawing = picture(comparison)
-        options.plot.write_bytes(drawing.png if options.plot.suffix == ".png" else drawing.svg.encode())
+        write_picture(options.plot, figure.picture(comparison))
     for line in comparison.lines:
-        print(inert(line, lines=False))
+        tell(line)
     return 0 if comparison.passed else 1
 
 
@@ -226,7 +219,6 @@ def command_compare(options: argparse.Namespace) -> int:
         return _compare_curves(options)
     if options.junit and options.tolerance is None:
         raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
-    check_outputs(options, "junit", "json")
     from flipproof.check.comparison import claims, compare, table
     from flipproof.frame.solvers import find
     from flipproof.frame.timing import solve_timed
@@ -253,7 +245,7 @@ def command_compare(options: argparse.Namespace) -> int:
 
     comparison = compare(load(options.first), load(options.second))
     if flown:
-        print(inert(f"{' and '.join(dict.fromkeys(flown))}: N = {scenario.n_slices} slices", lines=False))
+        tell(f"{' and '.join(dict.fromkeys(flown))}: N = {scenario.n_slices} slices")
     print(inert(table(comparison)))
     allowed = math.inf if options.tolerance is None else options.tolerance
     findings = claims(comparison, allowed, "; ".join(stopped))
@@ -264,5 +256,5 @@ def command_compare(options: argparse.Namespace) -> int:
     first = findings[0]
     status = "FAIL" if first.failed else "PASS"
     size = "not judged" if first.value is None else f"{first.value:.6g} {first.unit}"
-    print(inert(f"{status}  {first.title}: {size}, tolerance {options.tolerance:g} ({first.note})", lines=False))
+    tell(f"{status}  {first.title}: {size}, tolerance {options.tolerance:g} ({first.note})")
     return 1 if first.failed else 0

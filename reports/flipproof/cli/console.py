@@ -1,4 +1,4 @@
-"""The console as it is: text that it cannot show is written in ASCII, and no error message is endless."""
+"""The console as it is: what it cannot show is written in ASCII, and no message is endless or forges another."""
 
 from __future__ import annotations
 
@@ -19,6 +19,16 @@ ASCII: Final = {
     "″": "''", "Σ": "sum", "⁻": "^-", "↓": "v", "↑": "^", "✓": "ok", "✗": "x", "•": "*",
 }  # fmt: skip
 """How a character is written where it cannot be shown."""
+
+
+def say(words: str) -> None:
+    """Say on standard error what is no result."""
+    print(f"flipproof: {words}", file=sys.stderr, flush=True)
+
+
+def tell(line: str) -> None:
+    """Print a result that is one line, whatever is in it."""
+    print(inert(line, lines=False), flush=True)
 
 
 def readable(words: str) -> str:

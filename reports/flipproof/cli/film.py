@@ -11,15 +11,16 @@ from typing import Any
 from flipproof.cli.arguments import (
     SCENARIO_HELP,
     add_command,
-    check_outputs,
     command_line,
     count,
     number,
     output,
+    place,
     positive,
     read_scenario,
     real,
 )
+from flipproof.cli.console import say
 from flipproof.cli.progress import progress_bar
 
 
@@ -91,7 +92,7 @@ def _add_film_arguments(command: argparse.ArgumentParser) -> None:
         "scale and clock are right",
     )  # fmt: skip
     command.add_argument(
-        "--out", type=output, metavar="DIR", help="folder for track.csv, figures, summary.json and page"
+        "--out", type=place, metavar="DIR", help="folder for track.csv, figures, summary.json and page"
     )
 
 
@@ -124,7 +125,7 @@ def command_film(options: argparse.Namespace) -> int:
         try:
             assessments[0].check()
         except UnsoundError as error:
-            print(f"flipproof: {error}", file=sys.stderr)
+            say(str(error))
             return 1
         films.append(assessments)
     lines: list[str] = []
@@ -204,7 +205,6 @@ def command_export(options: argparse.Namespace) -> int:
     from flipproof.output.folder import write_text
     from slicemodel.trajectory import output_times
 
-    check_outputs(options, "out")
     scenario = read_scenario(options.scenario, options.slices)
     times = frame_times(scenario, options.frame_rate)
     solver = find(options.solver)
@@ -212,13 +212,13 @@ def command_export(options: argparse.Namespace) -> int:
     exact = {} if solver.package == "slicemodel" else {"times": np.union1d(output_times(scenario, None), times)}
     run, seconds = solve_timed(solver.name, scenario, **exact)
     if warning := doubt(run, seconds):
-        print(f"flipproof: {warning}", file=sys.stderr)
+        say(warning)
     if not run.ok:
-        print(f"flipproof: {options.solver}: {run.status}: {run.message}", file=sys.stderr)
+        say(f"{options.solver}: {run.status}: {run.message}")
     frames = at_times(run, times[times <= run.t[-1]])
     if options.height is not None:
         frames, landing = until_landing(run, frames, options.height, options.start)
-        print(f"flipproof: {landing}", file=sys.stderr)
+        say(landing)
     table = data_track_text(frames, start=options.start, origin=options.origin)
     if options.out:
         write_text(options.out, table)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import textwrap
 from contextlib import closing
 from dataclasses import asdict
@@ -14,7 +13,6 @@ from flipproof.cli.arguments import (
     SCENARIO_HELP,
     add_command,
     add_json,
-    check_outputs,
     count,
     output,
     read_scenario,
@@ -22,6 +20,7 @@ from flipproof.cli.arguments import (
     write_json,
     write_junit,
 )
+from flipproof.cli.console import say, tell
 from flipproof.figures.spoken import inert
 
 SPEC_HELP = (
@@ -112,7 +111,7 @@ def _opened(options: argparse.Namespace, **given: Any) -> Any:
     from flipproof.frame.solvers import catalogue
 
     if options.spec in catalogue() and options.spec in offered():
-        print(f"flipproof: {options.spec} is flipproof's own; the entry point of that name is hidden", file=sys.stderr)
+        say(f"{options.spec} is flipproof's own; the entry point of that name is hidden")
     memory = options.memory * 1e6 if options.memory else None
     return opened(options.spec, options.timeout, memory=memory, given=given)
 
@@ -128,26 +127,22 @@ def command_certify(options: argparse.Namespace) -> int:
 
     if options.equation is not None:
         check_equation(options.equation)
-    check_outputs(options, "json", "junit", "badge")
     names = ("name", "refined_by", "precision", "order")
     given = {name: value for name in names if (value := getattr(options, name)) is not None}
 
-    def say(line: str) -> None:
-        print(inert(line, lines=False), flush=True)
-
     drawn = SEED if options.seed is None else options.seed
     with closing(_opened(options, **given)) as runner:
-        certificate = certify(runner, equation=options.equation, seed=drawn, say=lambda result: say(result.line))
+        certificate = certify(runner, equation=options.equation, seed=drawn, say=lambda result: tell(result.line))
         write_json(options.json, certificate.to_mapping())
         write_junit(options.junit, findings_of(certificate), f"flipproof certify {certificate.traits.name}")
         if options.badge:
             write_text(options.badge, badge(certificate))
-    say(certificate.conclusion)
+    tell(certificate.conclusion)
     waiting = len(runner.waiting) if isinstance(runner, Folder) else 0
     if waiting:
         questions = "1 question waits" if waiting == 1 else f"{waiting} questions wait"
-        say(f"{questions} for answer.csv (columns t, theta, omega; r_0 to r_(N-1), v_0 to v_(N-1) if you have them)")
-        say(f"in {runner.folder}; certify again when they are there")
+        tell(f"{questions} for answer.csv (columns t, theta, omega; r_0 to r_(N-1), v_0 to v_(N-1) if you have them)")
+        tell(f"in {runner.folder}; certify again when they are there")
     return 1 if certificate.failed or waiting else 0
 
 
@@ -162,7 +157,7 @@ def command_place(options: argparse.Namespace) -> int:
             placement = place(runner)
         except ForeignError as error:
             words = f"{options.spec} cannot be placed; it does not answer the throws that tell equations apart: {error}"
-            print(inert(words, lines=False))
+            tell(words)
             return 1
     sentence = "; ".join(filter(None, (placement.text, placement.advice)))
     print(json.dumps(placement.to_mapping(), indent=1) if options.json else inert(sentence))

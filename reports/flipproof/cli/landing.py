@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Final
@@ -156,8 +155,5 @@ def command_upright(options: argparse.Namespace) -> int:
         spin, angle, speed = options.scatter
         size = replace(size, scatter=Scatter(spin=spin, angle=math.radians(angle), speed=speed))
 
-    def say(words: str) -> None:
-        if not options.quiet:
-            print(f"flipproof: {words}", file=sys.stderr, flush=True)
-
-    return fill(options, lambda begin, where: make_upright(throw, size, options.out, begin, **where | {"say": say}))
+    told = {"say": lambda _: None} if options.quiet else {}
+    return fill(options, lambda begin, where: make_upright(throw, size, options.out, begin, **where | told))

@@ -31,6 +31,7 @@ from flipproof.cli.arguments import (
     command_line,
     count,
     output,
+    place,
     read_scenario,
     refuse_overwriting,
     store_of,
@@ -38,7 +39,7 @@ from flipproof.cli.arguments import (
 )
 from flipproof.cli.bounce import add_bounce
 from flipproof.cli.check import add_checks, add_compare
-from flipproof.cli.console import readable, speak_plainly
+from flipproof.cli.console import readable, say, speak_plainly
 from flipproof.cli.film import add_film
 from flipproof.cli.foreign import add_foreign, add_models
 from flipproof.cli.landing import add_landing
@@ -132,7 +133,7 @@ def _words_of(error: OSError) -> str:
 
 def _complain(words: str, status: int) -> int:
     with suppress(OSError):  # the status says it where standard error does not take it
-        print(f"flipproof: error: {readable(words)}", file=sys.stderr, flush=True)
+        say(f"error: {readable(words)}")
     return status
 
 
@@ -156,6 +157,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         top.print_help()
         sys.exit(BAD_INPUT)
     refuse_overwriting(options, command)
+    check_outputs(options, command)
     return options
 
 
@@ -169,7 +171,7 @@ def parser() -> argparse.ArgumentParser:
 
     report = add_command(commands, "report", "Run everything and write a validation report.", command_report)
     report.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    report.add_argument("--out", type=output, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
+    report.add_argument("--out", type=place, default=DEFAULT_OUT, metavar="DIR", help="folder (default %(default)s)")
     report.add_argument(
         "--quick", action="store_true", help="fewer refinements; no maps, engine certificates or paper figures"
     )
@@ -247,7 +249,9 @@ def command_report(options: argparse.Namespace) -> int:
         with store_of(options) as store, workers(options.jobs) as pool, ReportProgress(ask.size) as bar:
             contents = parts() if measurement is None else (part_measured(measurement), *parts())
             work = {"guests": guests} if guests else {}
-            gathered = gather_report(ask, bar.show, Stages(bar.begin), store, pool, contents=contents, work=work)
+            gathered = gather_report(
+                ask, pool, bar.show, stages=Stages(bar.begin), store=store, contents=contents, work=work
+            )
             facts = provenance(command_line()) | store.facts() | facts_of(guests)
             report = build(gathered, facts, store.remembering(pool), bar.show, png=options.png)
         write(report, folder)
@@ -260,7 +264,7 @@ def command_report(options: argparse.Namespace) -> int:
         import webbrowser
 
         if not webbrowser.open((options.out / "index.html").resolve().as_uri()):
-            print("flipproof: no browser could be opened", file=sys.stderr)
+            say("no browser could be opened")
     return 1 if report.failed else 0
 
 
@@ -307,7 +311,6 @@ def command_simulate(options: argparse.Namespace) -> int:
     solver = find(options.solver)
     if options.steps is not None and solver.package != "slicemodel":
         raise ValueError(f"--steps {options.steps}: {solver.name} is not a scheme and chooses its own steps")
-    check_outputs(options, "out")
     settings = {} if options.steps is None else {"steps": options.steps}
     trajectory, seconds = solve_timed(solver.name, scenario, **settings)
     table = trajectory_csv(trajectory)
@@ -316,9 +319,9 @@ def command_simulate(options: argparse.Namespace) -> int:
     else:
         sys.stdout.write(table)
     if not trajectory.ok:
-        print(f"flipproof: {solver.name}: {trajectory.status}: {trajectory.message}", file=sys.stderr)
+        say(f"{solver.name}: {trajectory.status}: {trajectory.message}")
     if words := doubt(trajectory, seconds):
-        print(f"flipproof: {words}", file=sys.stderr)
+        say(words)
     return 0 if trajectory.ok else 1
 
 

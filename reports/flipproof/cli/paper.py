@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from flipproof.cli.arguments import add_command, add_no_cache, command_line, count, output, store_of
+from flipproof.cli.arguments import add_command, add_no_cache, command_line, count, place, store_of
 from flipproof.cli.progress import progress_bar
 
 
@@ -17,7 +17,7 @@ def add_paper(commands: Any) -> None:
         "--figure", action="append", default=[], metavar="NAME", help="one figure, such as 7b; may be given again (all)"
     )
     usual = Path("reports/latest.paper" if Path("reports/flipproof").is_dir() else "flipproof-paper")
-    paper.add_argument("--out", type=output, default=usual, metavar="DIR", help="folder to write (%(default)s)")
+    paper.add_argument("--out", type=place, default=usual, metavar="DIR", help="folder to write (%(default)s)")
     paper.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     add_no_cache(paper)
 

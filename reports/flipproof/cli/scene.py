@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, output, read_scenario
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, place, read_scenario
 
 
 def add_scene(commands: Any) -> None:
@@ -14,7 +14,7 @@ def add_scene(commands: Any) -> None:
     scene.add_argument("scenario", nargs="?", metavar="SCENARIO.toml", help=SCENARIO_HELP)
     scene.add_argument("--format", choices=["mjcf", "urdf"], default="mjcf", help="(default %(default)s)")
     scene.add_argument("--slices", type=count, default=10, metavar="N", help="slices, alpha/2m unchanged (%(default)s)")
-    scene.add_argument("--out", type=output, required=True, metavar="FOLDER", help="folder to write or replace")
+    scene.add_argument("--out", type=place, required=True, metavar="FOLDER", help="folder to write or replace")
 
 
 def command_scene(options: argparse.Namespace) -> int:

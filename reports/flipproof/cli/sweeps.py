@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, output, read_scenario, reader, sides
+from flipproof.cli.arguments import SCENARIO_HELP, add_command, count, place, read_scenario, reader, sides
+from flipproof.cli.console import say
 from flipproof.cli.progress import progress_bar
 from flipproof.cli.signals import INTERRUPTED
 
@@ -74,14 +74,14 @@ def command_waterfall(options: argparse.Namespace) -> int:
 
 def add_store(command: argparse.ArgumentParser) -> None:
     """Add what every command takes that fills a folder: where its rows go, who makes them, what they begin with."""
-    command.add_argument("--out", type=output, required=True, metavar="DIR", help="folder; holds a SQLite file of rows")
+    command.add_argument("--out", type=place, required=True, metavar="DIR", help="folder; holds a SQLite file of rows")
     where = command.add_mutually_exclusive_group()
     where.add_argument("--jobs", type=count, metavar="N", help="worker processes (default: one per core)")
     where.add_argument(
         "--executor", type=_executor, metavar="MODULE:FACTORY", help="factory of the concurrent.futures.Executor to "
         "use; with an argument, MODULE:FACTORY@ARGUMENT; Dask: distributed:Client@tcp://127.0.0.1:8786",
     )  # fmt: skip
-    command.add_argument("--export", type=output, metavar="FILE", help="when complete, write all rows to a .csv or .nc")
+    command.add_argument("--export", type=place, metavar="FILE", help="when complete, write all rows to a .csv or .nc")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -97,22 +97,15 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
 
     stored = [0, 0]
 
-    def say(words: str) -> None:
-        print(f"flipproof: {words}", file=sys.stderr, flush=True)
-
-    def begin(size: int) -> Callable[[int, int, bool], None]:
+    def begin(size: int) -> Callable[[int, int, int], None]:
         bars.close()
         stored[:] = 0, size
         show = bars.enter_context(progress_bar(options.out.name, "point", quiet=options.quiet))
-        without = before = 0
 
-        def progress(points: int, unfinished: int, made: bool) -> None:
-            nonlocal without, before
-            stored[0] += points
-            without += unfinished
-            before += 0 if made else points
-            show(stored[0], size, f"{without} without a whole flight" if without else "", before)
-            if stored[0] >= size:
+        def progress(done: int, without: int, before: int) -> None:
+            stored[0] = done
+            show(done, size, f"{without} without a whole flight" if without else "", before)
+            if done >= size:
                 bars.close()
 
         return progress
@@ -124,7 +117,7 @@ def fill(options: argparse.Namespace, make: Callable[[Any, dict[str, Any]], str]
     except KeyboardInterrupt:
         # An interrupt may fall between the storing of rows and their counting, or before older rows were looked at.
         sentence = f"at least {stored[0]} of {stored[1]} points are stored; " if stored[1] else ""
-        print(f"flipproof: interrupted; {sentence}the same command goes on from there", file=sys.stderr)
+        say(f"interrupted; {sentence}the same command goes on from there")
         return INTERRUPTED
     print(words)
     return 0

@@ -62,6 +62,12 @@ class Exhibit:
         """The finished figure; it is drawn now, and each time anew, if nobody has drawn it yet."""
         return self.drawn or draw(self.maker(*self.data))
 
+    def files(self) -> dict[str, bytes]:
+        """Return the files of the figure by their names: SVG, and PNG and CSV if there are any."""
+        drawing = self.drawing
+        contents = {"svg": drawing.svg.encode(), "png": drawing.png, "csv": (self.table or "").encode()}
+        return {f"{self.name}.{kind}": content for kind, content in contents.items() if content}
+
 
 def drawn(
     exhibits: Sequence[Exhibit],

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flipproof.frame.chapter import Absent, Ask, Chapter, Part
@@ -57,17 +57,13 @@ class Gathered:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChapterResult:
-    """Findings and figures of a chapter, and ``notes``: what is missing, each with the reason.
-
-    ``seconds`` are the wall times that its claims took to evaluate [s], by the findings' ids.
-    """
+    """Findings and figures of a chapter, and ``notes``: what is missing, each with the reason."""
 
     chapter: Chapter[Any]
     study_result: Any
     findings: tuple[Finding, ...]
     figures: tuple[Exhibit, ...]
     notes: tuple[tuple[str, str], ...]
-    seconds: Mapping[str, float] = field(default_factory=dict)
 
 
 def gather(
@@ -142,17 +138,8 @@ def evaluate(gathered: Gathered) -> dict[str, ChapterResult]:
 def _evaluated(chapter: Chapter[Any], outcome: Outcome[Any]) -> ChapterResult:
     findings: list[Finding | Absent] = []
     drawn: list[Exhibit] = []
-    seconds: dict[str, float] = {}
-
-    def claim() -> None:
-        began = time.perf_counter()
-        for finding in chapter.claims(outcome.value):
-            seconds[finding.id] = time.perf_counter() - began
-            findings.append(finding)
-            began = time.perf_counter()
-
     with chapter_errors(f"chapter {chapter.name!r}, claims"):
-        claims = attempt(claim)
+        claims = attempt(lambda: findings.extend(chapter.claims(outcome.value)))
     with chapter_errors(f"chapter {chapter.name!r}, figures"):
         figures = attempt(lambda: drawn.extend(chapter.figures(outcome.value)))
     if reason := claims.reason or figures.reason:
@@ -163,5 +150,4 @@ def _evaluated(chapter: Chapter[Any], outcome: Outcome[Any]) -> ChapterResult:
         findings=tuple(finding.finding if isinstance(finding, Absent) else finding for finding in findings),
         figures=tuple(drawn),
         notes=tuple((absent.title, absent.reason) for absent in findings if isinstance(absent, Absent)),
-        seconds=seconds,
     )

@@ -32,7 +32,7 @@ from typing import Any, Final
 from flipproof.frame.keys import changed_since_import, fingerprint, key_of, key_of_call, sources_written, versions_of
 from flipproof.frame.packing import pack, unpack
 from flipproof.frame.solvers import Run, RunResult
-from flipproof.frame.store import UNUSABLE, Entry, Store, has_code, is_damage
+from flipproof.frame.store import UNUSABLE, Entry, Store, check_private, has_code, is_damage
 from slicemodel import Trajectory
 
 NAME: Final = "runs-2.sqlite"
@@ -182,8 +182,8 @@ class RunStore(AbstractContextManager["RunStore"]):
     def _open(self, _: object) -> None:
         assert self.place is not None
         folder = self.place.parent
-        if folder.is_dir() and folder.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH) and sys.platform != "win32":
-            raise OSError("its folder may be written by other users")
+        if folder.is_dir():
+            check_private(folder, stat.S_IWGRP | stat.S_IWOTH)
         self._store = Store(self.place)
         if self.place.name == NAME:
             for old in folder.glob("runs-1.sqlite*"):  # of version 0.2.0, up to 1 GB

@@ -222,7 +222,6 @@ class Store(AbstractContextManager["Store"]):
 def check_own(path: Path) -> None:
     """Make the folder of a store, or refuse, by an OSError, a file or folder that another user may have written."""
     path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    folder = path.parent.stat()
     if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
         raise OSError("it is not a regular file")
     for end, starts in BESIDE.items():
@@ -234,12 +233,21 @@ def check_own(path: Path) -> None:
         with suppress(FileNotFoundError), beside.open("rb") as file:  # another program may have ended just now
             if (begins := file.read(8)) and not begins.startswith(starts):
                 raise OSError(f"{beside.name} beside it is not a file of SQLite's; move it away")
-    if sys.platform == "win32":
-        return
-    if folder.st_uid != os.geteuid() or (path.exists() and path.stat().st_uid != os.geteuid()):
+    if sys.platform != "win32" and path.exists() and path.stat().st_uid != os.geteuid():
         raise OSError("it belongs to another user")
-    if folder.st_mode & stat.S_IWOTH and not folder.st_mode & stat.S_ISVTX:
-        raise OSError("its folder may be written by other users")
+    check_private(path.parent)
+
+
+def check_private(folder: Path, writers: int = stat.S_IWOTH) -> None:
+    """Refuse, by an OSError, a folder of another user, and one that other users, of these ``writers``, may write.
+
+    A sticky bit does not help: it keeps files from being replaced, but not from being laid beside them.
+    """
+    facts = folder.stat()
+    if sys.platform != "win32" and facts.st_uid != os.geteuid():
+        raise OSError(f"{folder} belongs to another user; name a folder of your own")
+    if sys.platform != "win32" and facts.st_mode & writers:
+        raise OSError(f"{folder} may be written by other users; run chmod go-w on it, or name another folder")
 
 
 def is_damage(error: Exception) -> bool:

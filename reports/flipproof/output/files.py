@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -34,3 +34,9 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write a file so that a reader sees the old or the new content."""
     with whole_file(path) as part:
         part.write_bytes(content)
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write files of a folder, each as ``write_whole`` does."""
+    for name, content in contents.items():
+        write_whole(folder / name, content)

@@ -17,6 +17,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
+from flipproof.frame.store import check_private
 from flipproof.output.files import whole_file
 
 MARKER: Final = ".flipproof"
@@ -95,7 +96,7 @@ def sole_writer(lock: Path, folder: Path) -> Iterator[None]:
     """Hold the file ``lock`` for as long as the block lasts; the kernel lets go of it when this program dies.
 
     Raises OutputError if another program holds it, naming its process number and the ``folder``, if it cannot be
-    locked, and if ``check_private`` refuses the folder of the lock or the lock is not a file of this user alone.
+    locked, and if it is not a file of this user alone; OSError if ``check_private`` refuses its folder.
     """
     check_private(lock.parent)
     handle = _hold(lock, folder)
@@ -111,15 +112,6 @@ def sole_writer(lock: Path, folder: Path) -> Iterator[None]:
         if sys.platform == "win32":
             with suppress(OSError):
                 lock.unlink(missing_ok=True)
-
-
-def check_private(folder: Path) -> None:
-    """Refuse, by an OutputError, a folder of another user, and one in which other users may replace files."""
-    facts = folder.stat()
-    if sys.platform != "win32" and facts.st_uid != os.geteuid():
-        raise OutputError(f"{folder} belongs to another user; name a folder of your own")
-    if sys.platform != "win32" and facts.st_mode & stat.S_IWOTH and not facts.st_mode & stat.S_ISVTX:
-        raise OutputError(f"{folder} may be written by every user; run chmod o-w on it, or name another folder")
 
 
 def _open_lock(lock: Path) -> int:

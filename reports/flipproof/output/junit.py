@@ -3,15 +3,14 @@
 A regression claim is a test case: one that holds is bare, one that does not carries a failure, one that could not be
 evaluated carries an error with its reason. Observations cannot fail; they stand among the properties of the suite.
 
-The time of a case is what its claim took to evaluate, after the runs, which many claims share; the time of the suite is
-that of everything, runs included.
+Many claims share their runs, so that no case has a time of its own; the suite of a report has that of everything.
 """
 
 from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from flipproof.frame.findings import Finding
@@ -20,18 +19,8 @@ FORBIDDEN: Final = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U00
 """Characters that XML 1.0 cannot hold, not even escaped; the reason of a failed run may have any."""
 
 
-def junit_text(
-    findings: Sequence[Finding],
-    suite: str = "flipproof",
-    seconds: Mapping[str, float] | None = None,
-    whole: float | None = None,
-) -> str:
-    """Return the findings as one test suite.
-
-    ``seconds`` maps the id of a finding to the wall time of its evaluation, zero if missing; ``whole`` is that of
-    everything, their sum if None.
-    """
-    seconds = seconds or {}
+def junit_text(findings: Sequence[Finding], suite: str = "flipproof", seconds: float | None = None) -> str:
+    """Return the findings as one test suite, which took so many ``seconds`` if they are given."""
     cases = [finding for finding in findings if finding.kind == "regression"]
     verdicts = [finding.verdict for finding in cases]
     counts = {
@@ -40,8 +29,9 @@ def junit_text(
         "failures": str(verdicts.count("fail")),
         "errors": str(verdicts.count("not evaluated")),
         "skipped": "0",
-        "time": f"{sum(seconds.values()) if whole is None else whole:.3f}",
     }
+    if seconds is not None:
+        counts["time"] = f"{seconds:.3f}"
     root = ElementTree.Element("testsuites", {key: value for key, value in counts.items() if key != "skipped"})
     tests = ElementTree.SubElement(root, "testsuite", counts)
     observations = [finding for finding in findings if finding.kind == "observation"]
@@ -51,13 +41,13 @@ def junit_text(
             words = {"name": finding.id, "value": _clean(f"{_numbers(finding)}; {finding.title}")}
             ElementTree.SubElement(properties, "property", words)
     for finding in cases:
-        _add_case(tests, finding, suite, seconds.get(finding.id, 0.0))
+        _add_case(tests, finding, suite)
     ElementTree.indent(root, " ")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
 
 
-def _add_case(tests: ElementTree.Element, finding: Finding, suite: str, seconds: float) -> None:
-    words = {"classname": f"{suite}.{finding.id.partition('-')[0]}", "name": finding.id, "time": f"{seconds:.6f}"}
+def _add_case(tests: ElementTree.Element, finding: Finding, suite: str) -> None:
+    words = {"classname": f"{suite}.{finding.id.partition('-')[0]}", "name": finding.id}
     case = ElementTree.SubElement(tests, "testcase", words)
     numbers = f"{_numbers(finding)}, threshold {finding.threshold_text}"
     if finding.verdict == "fail":

@@ -27,11 +27,6 @@ def mathematics(text: str) -> str:
     return re.sub(r"(?<![\w)])-(?=\d)", "−", text).replace("(tau ", "(τ ")
 
 
-def numbers(text: str) -> Markup:
-    """Return text in which no line ends inside a number such as 1e-05, or between it and the sign of its bound."""
-    return Markup(re.sub(r"(?:≤ )?\d[\d.]*e[-+]\d+", r'<span class="name">\g<0></span>', str(escape(text))))
-
-
 TOKEN: Final = re.compile(
     r"\((?P<above>\w+)/(?P<below>\w+)\)|(?P<base>[A-Za-z]+)(?P<first>'*)(?:_(?P<sub>[A-Za-z]+))?(?P<last>'*)"
     r"(?:\^(?P<power>\d))?|(?P<number>\d+)|(?P<sign>[-+=/()])"

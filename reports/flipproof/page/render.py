@@ -13,7 +13,7 @@ from flipproof.chapters.differences.study import Difference, moved, percent
 from flipproof.frame.gather import ChapterResult, Gathered
 from flipproof.frame.solvers import find
 from flipproof.output.templating import environment
-from flipproof.page.equations import equation, mathematics, numbers, typeset
+from flipproof.page.equations import equation, mathematics, typeset
 from flipproof.page.glossary import EQUATIONS, TERMS, anchor, symbols
 from flipproof.page.live import live_data, sliders, touch_data
 from flipproof.page.parts import STORY, behind, sections, shared
@@ -72,7 +72,7 @@ def render(
     templates.filters |= {
         "typeset": typeset, "unbroken": unbroken, "amount": amount, "percent": percent, "touch_data": touch_data,
         "short": short, "restitution_error": restitution_error, "term_anchor": anchor, "equation": equation,
-        "shared": shared, "symbols": symbols, "mathematics": mathematics, "numbers": numbers, "signed": signed,
+        "shared": shared, "symbols": symbols, "mathematics": mathematics, "signed": signed,
     }  # fmt: skip
     templates.globals["assets"] = read_assets()
     verdict = headlines(gathered)
@@ -80,7 +80,8 @@ def render(
     figures = {figure.name: figure for result in results.values() for figure in result.figures}
     regressions = [finding for finding in findings if finding.kind == "regression"]
     flown = gathered.result("flights")
-    facts = story(summary, {name: figure.table for name, figure in figures.items()})
+    maps = gathered.result("maps") or {}
+    facts = story(summary, maps["gamma"].result if "gamma" in maps else None)
     controls = sliders(gathered.ask.throw)
     context = dict(
         scenario=gathered.ask.scenario,

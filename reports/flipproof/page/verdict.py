@@ -17,14 +17,13 @@ The story prints a number with the place in ``summary.json`` that it comes from:
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from types import SimpleNamespace
 from typing import Any, Final, Literal
 
+import numpy as np
 from markupsafe import Markup
 
 from engine_check.engines import ENGINES
@@ -32,7 +31,8 @@ from flipproof.chapters.agreement.chapter import UP_TO
 from flipproof.chapters.differences.chapter import BY_ENGINE, EQ8_FREE, FORMULAS, PROGRAM_EQ8, TOTAL, Differences
 from flipproof.chapters.differences.study import PARTING_BAND, percent
 from flipproof.chapters.finite_step.chapter import EVERYTHING, LOCATED, StepCosts
-from flipproof.chapters.maps.study import RUNGS, SLICES, place_of
+from flipproof.chapters.maps.chapter import nearest_cell
+from flipproof.chapters.maps.study import RUNGS, ValidityMap
 from flipproof.chapters.solvers import FREE
 from flipproof.chapters.waterfall.study import STEP, Waterfall
 from flipproof.figures.spoken import SPOKEN
@@ -42,7 +42,6 @@ from flipproof.frame.findings import finite_or_none
 from flipproof.frame.gather import Gathered
 from flipproof.frame.solvers import FINER
 from ode_reference.models import MODELS
-from slicemodel import Scenario
 
 Measure = Literal["largest", "share"]
 
@@ -356,8 +355,8 @@ COUNTED: Final[Mapping[int, str]] = {2: "two", 3: "three", 4: "four"}
 EXPERIMENTS: Final = {"minimum": "minimum", "change": "change-of-behaviour", "landing": "landing-angle"}
 
 
-def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> SimpleNamespace:
-    """Return what the template of the story draws from: ``content`` is the summary, ``tables`` the figures' CSV.
+def story(content: Mapping[str, Any], bottles: ValidityMap | None = None) -> SimpleNamespace:
+    """Return what the template of the story draws from: ``content`` is the summary, ``bottles`` the map over damping.
 
     What is missing in the summary is None or empty.
     """
@@ -386,7 +385,7 @@ def story(content: Mapping[str, Any], tables: Mapping[str, str | None]) -> Simpl
         nearest=_nearest(summary),
         water=_water(summary),
         weight_first=summary.at("headlines/pair/what") == RUNG_NAMES["weightless"],
-        map=_map(tables.get("map-gamma"), content),
+        map=_map(bottles),
         names=NAMES,
     )
 
@@ -468,41 +467,35 @@ def _nearest(summary: Summary) -> list[SimpleNamespace]:
     return sorted(equations, key=lambda equation: (-equation.agrees.value, -equation.nearest.value))
 
 
-def _map(table: str | None, content: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Return the map over filling and damping for the script, from the CSV of its figure; None without one.
+def _map(bottles: ValidityMap | None) -> dict[str, Any] | None:
+    """Return the map over filling and damping for the script; None without one.
 
     ``thrown`` is the place of the report's throw on it and ``here`` the largest fair share in the cell next to it;
     ``numbers`` are those of the assumptions in the figure; ``slices`` those of every bottle on the map.
     """
-    if not table:
+    if bottles is None:
         return None
-    rows = list(csv.DictReader(io.StringIO(table)))
-    plateau = "plateau of omega/omega_0 {} [1]"
-    solvers = [name for name in NAMES if plateau.format(name) in rows[0]]
-    fill, damping = (name for name in list(rows[0])[:2])
-
-    def mean(row: Mapping[str, str], solver: str) -> float | None:
-        text = row[plateau.format(solver)]
-        return finite_or_none(float(text)) if text else None
-
-    x, y = place_of(Scenario.from_mapping(content["scenario"]), "gamma", 1000)
-    nearest = min(rows, key=lambda row: (abs(float(row[fill]) - x), abs(float(row[damping]) - y)))
+    solvers = [name for name in NAMES if name in bottles.level]
+    largest = np.array([*RUNGS, ""])[bottles.dominant].tolist()  # -1: none
+    means = {name: np.round(bottles.level[name], 9).tolist() for name in solvers}
+    row, column = nearest_cell(bottles)
     return {
-        "fills": sorted({float(row[fill]) for row in rows}),
-        "dampings": sorted({float(row[damping]) for row in rows}),
+        "fills": bottles.fills.tolist(),
+        "dampings": bottles.values.tolist(),
         "numbers": {name: k for k, name in enumerate(RUNGS, start=1)},
-        "slices": SLICES,
-        "thrown": (x, y),
-        "here": nearest.get("largest fair share", ""),
+        "slices": bottles.slices,
+        "thrown": bottles.thrown,
+        "here": largest[row][column],
         "solvers": solvers,
         "cells": [
             {
-                "x": float(row[fill]),
-                "y": float(row[damping]),
-                "which": row.get("largest fair share", ""),
-                "mean": [mean(row, name) for name in solvers],
+                "x": fill,
+                "y": damping,
+                "which": largest[j][i],
+                "mean": [finite_or_none(means[name][j][i]) for name in solvers],
             }
-            for row in rows
+            for j, damping in enumerate(bottles.values.tolist())
+            for i, fill in enumerate(bottles.fills.tolist())
         ],
     }
 

@@ -73,9 +73,8 @@ def make_gallery(
             runs = gather_figures(wanted, pool, progress, store)
             exhibits = drawn(list(exhibits_paper(runs, wanted)), pool=store.remembering(pool))
         for exhibit in exhibits:
-            (folder / f"{exhibit.name}.svg").write_text(exhibit.drawing.svg, encoding="utf-8")
-            (folder / f"{exhibit.name}.png").write_bytes(exhibit.drawing.png)
-            (folder / f"{exhibit.name}.csv").write_text(exhibit.table or "", encoding="utf-8")
+            for name, content in exhibit.files().items():
+                (folder / name).write_bytes(content)
         (folder / "parameters.csv").write_text(rows_csv(HEADER, parameter_rows()), encoding="utf-8")
         facts = {**provenance, **store.facts()}
         (folder / "index.html").write_text(render_gallery(exhibits, runs, facts), encoding="utf-8")

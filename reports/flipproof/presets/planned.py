@@ -3,11 +3,8 @@
 ::
 
     DIR/sweep.sqlite                     every run, one row each
-    DIR/map.svg, DIR/map.png             the figure of a map
-    DIR/map.csv                          one row per cell: plateaus, differences, fair shares, reasons
-    DIR/map.json                         contours as lines, and how often each assumption has the largest fair share
-    DIR/waterfall-plateau.svg, .png ...  one figure per observable of a waterfall
-    DIR/waterfall.csv                    one row per observable and bar
+    DIR/map-gamma.svg, .png, .csv        the figure of a map along that axis, and one row per cell
+    DIR/waterfall-plateau.svg ...        as many files per observable of a waterfall, one row per bar
 
 A study of a chapter plans runs and reads what became of them; who makes them, and whether the program died
 in between, is not its business. Here the loop of a sweep makes them, each once.
@@ -15,7 +12,6 @@ in between, is not its business. Here the loop of a sweep makes them, each once.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -23,13 +19,10 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from flipproof.chapters.maps.chapter import CONTOURS, contour_lines, errors, figure_map
+from flipproof.chapters.maps.chapter import exhibit
 from flipproof.chapters.maps.study import (
     CURVE,
-    EXTRA,
-    LADDER,
     RUNGS,
     Axis,
     Reading,
@@ -39,16 +32,12 @@ from flipproof.chapters.maps.study import (
     study_readings,
     word,
 )
-from flipproof.chapters.solvers import SCHEMES
-from flipproof.chapters.waterfall.chapter import figure_waterfall
+from flipproof.chapters.waterfall.chapter import figures
 from flipproof.chapters.waterfall.study import PROGRAM, Waterfall, plan_waterfall, split_all
-from flipproof.figures.style import draw
-from flipproof.frame.columns import rows_csv
 from flipproof.frame.solvers import Run
 from flipproof.frame.store import Store
 from flipproof.frame.twins import FLOOR
-from flipproof.output.files import write_whole
-from flipproof.sweep.axes import FILL
+from flipproof.output.files import write_files
 from flipproof.sweep.command import Begin, completed
 from flipproof.sweep.errors import SweepError
 from flipproof.sweep.loop import rows_of
@@ -81,19 +70,10 @@ def read_runs(store: Store, runs: Sequence[Run], curves: int, names: Sequence[st
     return {run: row for run, row in rows.items() if row is not None}
 
 
-def _draw(figure: Figure, out: Path, name: str) -> None:
-    drawing = draw(figure)
-    write_whole(out / f"{name}.svg", drawing.svg.encode())
-    write_whole(out / f"{name}.png", drawing.png)
-
-
 # ---------------------------------------------------------------------- the map of validity
 
-NAMES: Final = (*LADDER, *EXTRA)
 READ_OFF: Final = ("omega",)
 """What of the curves of a run a map reads."""
-
-VALUES: Final[Mapping[Axis, str]] = {"gamma": "gamma/omega0", "step": "omega0*dt", "restitution": "restitution"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,53 +106,12 @@ def make_map(plan: MapPlan, out: Path, begin: Begin, **how: Any) -> str:
     runs = plan.runs()
     with completed_runs(runs, out, begin, CURVE, READ_OFF, **how) as (store, summary):
         study = plan.study(read_runs(store, runs, CURVE, READ_OFF))
-        _draw(figure_map(study), out, "map")
-        write_whole(out / "map.csv", map_csv(study).encode())
-        write_whole(out / "map.json", json.dumps(map_facts(study, plan.throw), indent=1, allow_nan=False).encode())
+        shown = exhibit(study)
+        write_files(out, shown.files())
         shares = ", ".join(f"{name} {count}" for name, count in _dominating(study).items() if count)
         words = f"cells by largest fair share of omega/omega_0, mean of the second half, N = {study.slices}"
         small = f", too small or too near the next to tell {count}" if (count := _undecided(study)) else ""
-        return f"{summary}\n{words}: {shares or 'none'}{small}; see {out / 'map.png'}"
-
-
-def map_csv(study: ValidityMap) -> str:
-    """Return one row per cell as CSV; a number that could not be computed is an empty cell with a reason."""
-    fills, values = np.meshgrid(study.fills, study.values)
-    columns = {
-        FILL: fills,
-        VALUES[study.axis]: values,
-        **{f"plateau {name}": study.level[name] for name in NAMES},
-        **{f"fair share of {name}": share for name, share in zip(RUNGS, study.shares, strict=True)},
-        **{f"largest difference of {name} from {LADDER[-1]}": study.largest[name] for name in NAMES},
-        **{f"step error of {name}": study.step_error[name] for name in SCHEMES},
-        "largest fair share": np.array([*RUNGS, ""])[study.dominant],  # -1: none
-        "reason": study.reason,
-    }
-    finite = [np.where(np.isfinite(c), c, np.nan) if c.dtype.kind == "f" else c for c in columns.values()]
-    return rows_csv(list(columns), zip(*(cells.flat for cells in finite), strict=True), digits=None)
-
-
-def map_facts(study: ValidityMap, throw: Scenario) -> dict[str, Any]:
-    """Return what a program reads off a map: contours as lines of (fill fraction, value), cells by largest step."""
-    return {
-        "throw": throw.to_mapping(),
-        "x": FILL,
-        "y": VALUES[study.axis],
-        "ladder": list(LADDER),
-        "cells by largest fair share": _dominating(study),
-        "cells undecided": _undecided(study),
-        "cells without": int(study.missing.sum()),
-        "contours": [
-            {
-                "of": words,
-                "level": level,
-                "lines": [line.tolist() for line in contour_lines(study, error, level)],
-                "cells above": int((error >= level).sum()),
-            }
-            for words, error in errors(study)
-            for level, _ in CONTOURS
-        ],
-    }
+        return f"{summary}\n{words}: {shares or 'none'}{small}; see {out / shown.name}.png"
 
 
 def _dominating(study: ValidityMap) -> dict[str, int]:
@@ -213,8 +152,8 @@ def make_split(throw: Scenario, out: Path, begin: Begin, **how: Any) -> str:
     with completed_runs(runs, out, begin, ENDS, LANDS_AT, **how) as (store, summary):
         waterfalls = split_rows(read_runs(store, runs, ENDS, LANDS_AT))
         for waterfall in waterfalls:
-            _draw(figure_waterfall(waterfall), out, f"waterfall-{waterfall.observable.name}")
-        write_whole(out / "waterfall.csv", waterfall_csv(waterfalls).encode())
+            (shown,) = figures((waterfall,))
+            write_files(out, replace(shown, name=f"waterfall-{waterfall.observable.name}").files())
         return f"{_table(waterfalls[0])}\n{summary}"
 
 
@@ -237,24 +176,6 @@ def _observed(run: Run, row: Row) -> dict[str, float]:
         "toppling": float(toppling_angle(throw, row["r_cm_end"])),
         "v_cm": row["v_cm"][-1],
     }
-
-
-def waterfall_csv(waterfalls: tuple[Waterfall, ...]) -> str:
-    """Return one row per observable and bar as CSV; numbers read back to the last bit."""
-    header = ["observable", "unit", "bar", "forward", "backward", "mean of all orders", "forward band", "mean band"]
-    rows: list[list[Any]] = []
-    for waterfall in waterfalls:
-        observable = (waterfall.observable.name, waterfall.observable.unit)
-        rows += [
-            [*observable, "published program", waterfall.start, "", "", "", ""],
-            *(
-                [*observable, b.name, b.forward, b.backward, b.average, b.forward_band, b.average_band]
-                for b in waterfall.bars
-            ),
-            [*observable, "free flight", waterfall.end, "", "", waterfall.end_band, ""],
-            [*observable, "rods", waterfall.rods, "", "", "", ""],
-        ]
-    return rows_csv(header, rows, digits=None)
 
 
 def _table(waterfall: Waterfall) -> str:

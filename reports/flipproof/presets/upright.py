@@ -5,8 +5,8 @@
     DIR/aims/sweep.sqlite      throws that chose the aims, one row each
     DIR/throws/sweep.sqlite    throws that are counted, one row each
     DIR/upright.csv            shares with their intervals, one row a cell
-    DIR/map.csv                outcomes over filling and omega_0
-    DIR/*.svg, DIR/*.png       the figures
+    DIR/landing-map.csv        outcomes over filling and omega_0
+    DIR/*.svg, *.png, *.csv    the figures and their numbers
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from flipproof.chapters.landing.figures import figures, map_csv, share_line, shares_csv
+from flipproof.chapters.landing.figures import figures, share_line, shares_csv
 from flipproof.chapters.landing.study import Cases, Rows, Size, aiming, counting, read
 from flipproof.chapters.landing.throws import Throws
 from flipproof.chapters.landing.work import Landed
-from flipproof.output.files import write_whole
+from flipproof.output.files import write_files
 from flipproof.sweep.command import Begin, completed, own_folder
 from flipproof.sweep.loop import rows_of
 from slicemodel import Scenario
@@ -67,11 +67,8 @@ def make_upright(
     throws = counting(throw, size, aims, make("aims", aims))
     results = read(throw, size, throws, make("throws", throws), unaimed)
     say("figures")
-    write_whole(out / "upright.csv", shares_csv(results).encode())
-    write_whole(out / "map.csv", map_csv(results).encode())
+    write_files(out, {"upright.csv": shares_csv(results).encode()})
     for exhibit in figures(results):
-        drawing = exhibit.drawing
-        write_whole(out / f"{exhibit.name}.svg", drawing.svg.encode())
-        write_whole(out / f"{exhibit.name}.png", drawing.png)
+        write_files(out, exhibit.files())
     lines = [share_line(results, family) for family in size.families]
     return "\n".join([*lines, f"({results.assumed})", *summaries, f"Tables and figures: {out}"])

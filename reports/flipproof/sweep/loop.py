@@ -35,8 +35,8 @@ IN_FLIGHT: Final = 64
 MAX_LOST: Final = 30
 """Chunks lost one after the other from which on it is not the points that kill the workers."""
 
-Progress = Callable[[int, int, bool], object]
-"""Called with a number of points, with how many of them have no whole flight, and whether they were just made."""
+Progress = Callable[[int, int, int], object]
+"""Called with how many points have a row, how many of them have no whole flight, and how many were there before."""
 
 
 def fill(
@@ -61,10 +61,10 @@ def fill(
     flying: dict[Future[WorkerResult], Chunk] = {}
     done: queue.SimpleQueue[Future[WorkerResult]] = queue.SimpleQueue()
 
-    def count(rows: Iterable[Row], made: bool = False) -> None:
-        statuses = [str(row["status"]) for row in rows]
-        counts.update(statuses)
-        progress(len(statuses), sum(status not in ("ok", "escaped", "undecided") for status in statuses), made)
+    def count(rows: Iterable[Row]) -> None:
+        counts.update(str(row["status"]) for row in rows)
+        done = counts.total()
+        progress(done, done - counts["ok"] - counts["escaped"] - counts["undecided"], done - n_new)
 
     points = iter(points)
     if not (begin := list(islice(points, 1))):
@@ -109,7 +109,7 @@ def fill(
             raise SweepError(f"a worker runs flipproof {result.code}, this is {code}; install the same in both")
         store.put(_entries(chunk, result, base))
         n_new += len(result.rows)
-        count(result.rows, made=True)
+        count(result.rows)
 
 
 def rows_of(store: Store, points: Iterable[Point]) -> Iterator[Row | None]:

@@ -1,6 +1,5 @@
 """The example exports, what ``track`` refuses of them, and ``export``."""
 
-import argparse
 import importlib.util
 import math
 import shutil
@@ -8,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up import action as run
 
 import ode_reference
-from flipproof.cli.film import add_film
 from flipproof.film.clip import read_film
 from flipproof.film.tracker.reader import read_track_table
 from slicemodel import Scenario
@@ -18,14 +17,6 @@ from slicemodel import Scenario
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "tracker"
 TRACKED = sorted(path.name for path in EXAMPLES.iterdir() if path.suffix in (".txt", ".csv"))
 BOTH = ("--cap", "cap", "--base", "base", "--length-unit", "m")
-
-
-def run(*arguments):
-    """Run a command as ``flipproof`` would; return its exit status."""
-    parser = argparse.ArgumentParser(prog="flipproof")
-    add_film(parser.add_subparsers(required=True))
-    options = parser.parse_args([str(argument) for argument in arguments])
-    return options.action(options)
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,7 @@ from flipproof.chapters.maps.study import (
     plan_map,
     study_readings,
 )
-from flipproof.chapters.solvers import SCHEMES
+from flipproof.chapters.solvers import FREE, SCHEMES
 from flipproof.figures.style import new_figure, styled
 from flipproof.frame.chapter import Absent, Ask, Call, Chapter, Claims, Exhibit, Outcome, Study, attempt, results_of
 from flipproof.frame.columns import rows_csv
@@ -94,10 +94,11 @@ def claims(maps: Maps) -> Claims:
 
 def figures(maps: Maps) -> Iterator[Exhibit]:
     """Yield every map."""
-    yield from map(_exhibit, results_of(maps).values())
+    yield from map(exhibit, results_of(maps).values())
 
 
-def _exhibit(study: ValidityMap) -> Exhibit:
+def exhibit(study: ValidityMap) -> Exhibit:
+    """Return a map with its words and the numbers of its cells."""
     dominant = study.dominant
     which = "fair share (mean over all orders of changing)"
     shade, contours = (
@@ -128,13 +129,16 @@ def _exhibit(study: ValidityMap) -> Exhibit:
     )
 
 
+def nearest_cell(study: ValidityMap) -> tuple[int, int]:
+    """Return row and column of the cell that is nearest to the throw, as the map is drawn."""
+    fill, value = study.thrown
+    row = np.abs(_as_drawn(study.values, study.axis) - _as_drawn(value, study.axis)).argmin()
+    return int(row), int(np.abs(study.fills - fill).argmin())
+
+
 def _thrown_words(study: ValidityMap) -> str:
     """Return what the cross marks, and which share is largest in the nearest cell."""
-    if study.thrown is None:
-        return ""
-    column = int(np.abs(study.fills - study.thrown[0]).argmin())
-    row = int(np.abs(_as_drawn(study.values, study.axis) - _as_drawn(study.thrown[1], study.axis)).argmin())
-    k = int(study.dominant[row, column])
+    k = int(study.dominant[nearest_cell(study)])
     largest = f"; in the cell nearest to it the largest fair share is that of “{RUNGS[k]}”" if k >= 0 else ""
     return f" The cross is the throw of this report{largest}."
 
@@ -178,17 +182,23 @@ def _within(study: ValidityMap) -> str:
 
 
 def _cells_csv(study: ValidityMap) -> str:
-    """Return every cell: the plateau of each solver, and the assumption with the largest fair share."""
+    """Return every cell: plateaus, fair shares and the assumption with the largest, differences and step errors."""
     solvers = (*LADDER, *EXTRA)
+    others = [name for name in solvers if name != FREE]
     label = LABELS[study.axis]
     for sign, word in (("γ", "gamma"), ("ω", "omega"), ("₀", "_0"), ("Δ", "d")):
         label = label.replace(sign, word)
     return rows_csv(
         ("fill fraction [1]", label, "largest fair share",
-         *(f"plateau of omega/omega_0 {name} [1]" for name in solvers), "not computed because"),
+         *(f"plateau of omega/omega_0 {name} [1]" for name in solvers),
+         *(f"fair share of {name} [1]" for name in RUNGS),
+         *(f"largest difference of {name} from {FREE} [1]" for name in others),
+         *(f"step error of {name} [1]" for name in SCHEMES), "not computed because"),
         (
             (study.fills[column], study.values[row], RUNGS[k] if k >= 0 else None,
-             *(study.level[name][row, column] for name in solvers), study.reason[row, column])
+             *(study.level[name][row, column] for name in solvers), *study.shares[:, row, column],
+             *(study.largest[name][row, column] for name in others),
+             *(study.step_error[name][row, column] for name in SCHEMES), study.reason[row, column])
             for (row, column), k in np.ndenumerate(study.dominant)
         ),
     )  # fmt: skip
@@ -230,9 +240,8 @@ def figure_map(study: ValidityMap) -> Figure:
         handles += _contours(axes, study, error, name, colour)
     if logarithmic:
         axes.set_yscale("log")
-    if study.thrown is not None:
-        cross: dict[str, Any] = {"markersize": 10, "markeredgewidth": 2.5, "path_effects": HALO}
-        handles += axes.plot(*study.thrown, "x", color="#000000", label="this throw", zorder=5, **cross)
+    cross: dict[str, Any] = {"markersize": 10, "markeredgewidth": 2.5, "path_effects": HALO}
+    handles += axes.plot(*study.thrown, "x", color="#000000", label="this throw", zorder=5, **cross)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel="fill fraction M_w / M_max [1]", ylabel=LABELS[study.axis])
     axes.grid(visible=False)
     title = f"Plateau of ω / ω₀ at N = {study.slices}: {shaded} (shade), largest fair share (outline)"
@@ -282,16 +291,6 @@ def _crosses(error: FloatArray, level: float) -> bool:
     """Return whether a map has a contour at ``level``."""
     finite = error[np.isfinite(error)]
     return bool(finite.size and finite.min() < level < finite.max())
-
-
-def contour_lines(study: ValidityMap, error: FloatArray, level: float) -> list[FloatArray]:
-    """Return the contour of ``error`` as lines of (fill fraction, value) on the map, each of shape (K, 2)."""
-    if not _crosses(error, level):
-        return []
-    contours = Figure().subplots().contour(study.fills, study.values, error, levels=[level])
-    # Interpolation may miss the ends of an axis by a last digit.
-    low, high = np.array([(axis[0], axis[-1]) for axis in (study.fills, study.values)]).T
-    return [np.clip(line, low, high) for line in contours.allsegs[0] if len(line)]
 
 
 def _edges(centres: FloatArray, *, logarithmic: bool) -> FloatArray:

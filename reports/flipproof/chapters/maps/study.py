@@ -106,9 +106,9 @@ class ValidityMap:
     reason : array of str - "" or why the cell, or a part of it, could not be computed
     shares : array, shape (rungs, rows, columns)
         Fair share of every rung in the plateau, signed; they add up from the published program to free flight.
+    thrown : (fill fraction, quantity along y) of the throw that the map varies
     band : array or None
         By how much twins move the plateau of free flight, the most sensitive equation; None if they were not flown.
-    thrown : (fill fraction, quantity along y) of the throw that the map varies, or None
     """
 
     axis: Axis
@@ -120,8 +120,8 @@ class ValidityMap:
     step_error: Mapping[str, FloatArray]
     reason: NDArray[np.str_]
     shares: FloatArray
+    thrown: tuple[float, float]
     band: FloatArray | None = None
-    thrown: tuple[float, float] | None = None
 
     @property
     def error(self) -> FloatArray:
