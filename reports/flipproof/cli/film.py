@@ -33,7 +33,7 @@ def add_film(commands: Any) -> None:
         "File), or a track.csv",
     )  # fmt: skip
     _add_film_arguments(track)
-    track.set_defaults(kind="track", model=["free-flight"], quantity=None, minutes=10.0)
+    track.set_defaults(kind="track", model=["free-flight"], minutes=10.0)
 
     export = add_command(
         commands, "export", "Write a simulation as a table that Tracker lays over a video.", command_export
@@ -61,7 +61,6 @@ def add_film(commands: Any) -> None:
         "--model", nargs="+", default=["free-flight"], metavar="NAME", help="equations to fit and compare, see "
         "'flipproof models'; midpoint solves eq8 in steps of 0.5 ms (default free-flight)",
     )  # fmt: skip
-    fit.add_argument("--quantity", choices=("points", "theta", "omega"), help="what to fit (default: points, if any)")
     fit.add_argument(
         "--each", action="store_true", help="every FILE is a film of the same bottle: gamma and restitution are shared"
     )
@@ -156,13 +155,12 @@ def _estimate(options: argparse.Namespace, paths: tuple[Path, ...], scenario: An
 
     film = read_film(
         paths, cap=options.cap, base=options.base, length_unit=options.length_unit, time_unit=options.time_unit,
-        frame_rate=options.frame_rate, quantity=options.quantity,
+        frame_rate=options.frame_rate,
     )  # fmt: skip
-    release = film.release if options.release is None else options.release
-    if release is not None and options.landing is not None and not release < options.landing:
-        raise ValueError(f"landing = {options.landing:g} s does not follow release = {release:g} s")
+    if None not in (options.release, options.landing) and not options.release < options.landing:
+        raise ValueError(f"landing = {options.landing:g} s does not follow release = {options.release:g} s")
     held = Held(
-        release=release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
+        release=options.release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
         scale="scale" in options.hold, noise=options.noise,
     )  # fmt: skip
     with progress_bar(solver, "flight") as step:

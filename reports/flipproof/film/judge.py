@@ -188,9 +188,8 @@ class Assessment:
     def held(self) -> dict[str, tuple[float, str]]:
         """What is held: the parameter, its value [as of ``UNITS``] and what holds it."""
         held, release = self.estimate.held, self.estimate.likelihood.held.release
-        given = held.release is not None and held.release != self.estimate.film.release
         values: dict[str, tuple[float | None, str]] = {
-            "release": (release, "--release" if given else "the release of the table"),
+            "release": (release, "--release" if held.release is not None else "the release of the table"),
             "theta0": (held.theta0 if self.estimate.curve.slopes is not None else None, "theta0 of the scenario"),
             "touch": (held.touch, "--landing"),
             "noise": (held.noise, "--noise"),

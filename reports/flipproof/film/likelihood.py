@@ -82,7 +82,6 @@ class Film:
     quantity : what ``values`` are
     lines : (P,) - lines of the file, 0 where a frame has none
     notes : how the file was read
-    release : float or None - [s], if the file states it
     """
 
     label: str
@@ -91,7 +90,6 @@ class Film:
     quantity: Quantity
     lines: NDArray[np.int64]
     notes: tuple[str, ...] = ()
-    release: float | None = None
 
     def names(self, count: int) -> tuple[str, ...]:
         """Return the names of the inner parameters, with ``count`` motions of a hand."""

@@ -284,16 +284,9 @@ def turned(x):
     return np.concatenate((x[:1], x[1:2] + 2 * np.pi, x[2:]))
 
 
-def test_an_angle_of_a_track_begins_at_its_release(quick, tmp_path):
-    """All frames of the hand were taken for flight, and omega_0 for 0."""
+def test_the_noise_of_angles_is_an_angle(quick):
     _, judged = quick
-    (tmp_path / "track.csv").write_text(page.track_csv(judged), encoding="utf-8")
-    film = read_table(tmp_path / "track.csv", "theta")
-    assert film.release == pytest.approx(judged.estimate.best["release"], abs=1e-9)
-    np.testing.assert_allclose(film.t, judged.estimate.film.t[judged.estimate.flying], rtol=0, atol=1e-12)
-    assert film.notes == ("theta of a track.csv, from its release to its touch",)
-    assert read_table(tmp_path / "track.csv").release is None  # points have their own
-    angles = Assessment(replace(judged.estimate, film=film))
+    angles = Assessment(replace(judged.estimate, film=replace(judged.estimate.film, quantity="theta")))
     assert (angles.unit("noise"), judged.unit("noise")) == ("rad", "m")
 
 
