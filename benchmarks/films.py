@@ -19,7 +19,6 @@ import sys
 import time
 import traceback
 from collections import Counter
-from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -170,7 +169,7 @@ def information_ratios(made: film_simulator.Clip, throw: Scenario) -> tuple[floa
     film = film_of(made)
     x, _ = fit_place(film, curves[0], spin, truth["touch"], throw.bottle.length)
     flying = (film.t >= truth["release"]) & (film.t <= truth["touch"])
-    flight = replace(film, t=film.t[flying], values=film.values[:, flying], lines=film.lines[flying])
+    flight = film.frames(flying)
     likelihood = Likelihood(flight, Held(), truth["touch"], truth["noise"])
     values = [likelihood.model(curve, x)[0] for curve in curves]
     outer = [(values[1] - values[2]) / (2 * change * rate), (values[3] - values[4]) / (2 * change)]

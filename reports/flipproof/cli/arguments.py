@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 from flipproof.cli.console import readable
 
 if TYPE_CHECKING:
+    from flipproof.figures.style import Drawing
     from flipproof.frame.findings import Finding
     from flipproof.frame.run_store import RunStore
 
@@ -200,6 +201,17 @@ def write_junit(
         from flipproof.output.junit import junit_text
 
         write_text(path, junit_text(findings, suite, seconds))
+
+
+def check_plot(path: Path | None) -> None:
+    """Refuse a name of a figure that ends neither in .png nor in .svg."""
+    if path and path.suffix not in (".png", ".svg"):
+        raise ValueError(f"--plot {path} ends neither in .png nor in .svg")
+
+
+def write_plot(path: Path, drawing: Drawing) -> None:
+    """Write a figure as its name says."""
+    path.write_bytes(drawing.png if path.suffix == ".png" else drawing.svg.encode())
 
 
 def command_line() -> str:

@@ -5,7 +5,16 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flipproof.cli.arguments import add_command, add_json, check_outputs, output, real, write_json
+from flipproof.cli.arguments import (
+    add_command,
+    add_json,
+    check_outputs,
+    check_plot,
+    output,
+    real,
+    write_json,
+    write_plot,
+)
 from flipproof.cli.progress import progress_bar
 from flipproof.figures.spoken import inert
 
@@ -33,8 +42,7 @@ def command_bounce(options: argparse.Namespace) -> int:
     from flipproof.bounce.specs import load
 
     check_outputs(options, "json", "plot")
-    if options.plot and options.plot.suffix not in (".png", ".svg"):
-        raise ValueError(f"--plot {options.plot} ends neither in .png nor in .svg")
+    check_plot(options.plot)
     passports = []
     for adapter in map(load, options.adapter):
         print(inert(adapter.name) + f", step {options.dt:g} s")
@@ -49,6 +57,5 @@ def command_bounce(options: argparse.Namespace) -> int:
     if options.plot:
         from flipproof.bounce.figure import picture
 
-        drawing = picture(passports)
-        options.plot.write_bytes(drawing.png if options.plot.suffix == ".png" else drawing.svg.encode())
+        write_plot(options.plot, picture(passports))
     return 0

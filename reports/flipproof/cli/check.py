@@ -16,6 +16,7 @@ from flipproof.cli.arguments import (
     add_no_cache,
     check_guests,
     check_outputs,
+    check_plot,
     count,
     output,
     read_scenario,
@@ -23,6 +24,7 @@ from flipproof.cli.arguments import (
     store_of,
     write_json,
     write_junit,
+    write_plot,
 )
 from flipproof.figures.spoken import inert
 
@@ -204,8 +206,7 @@ def _compare_curves(options: argparse.Namespace) -> Comparison:
         raise ValueError("--scenario is that of throws; these files may be of anything")
     if options.from_twins and options.tolerance is not None:
         raise ValueError("--from-twins and --tolerance exclude each other")
-    if options.plot and options.plot.suffix not in (".png", ".svg"):
-        raise ValueError(f"--plot {options.plot} ends neither in .png nor in .svg")
+    check_plot(options.plot)
     first, second = (read(name, options.columns) for name in (options.first, options.second))
     twins, twins_of_b = ([read(path, options.columns) for path in paths] for paths in (options.twin, options.twin_of_b))
     allowed = None if options.from_twins else TOLERANCE if options.tolerance is None else options.tolerance
@@ -262,8 +263,7 @@ def command_compare(options: argparse.Namespace) -> int:
     if options.plot:
         from flipproof.curves.figure import picture
 
-        drawing = picture(comparison)
-        options.plot.write_bytes(drawing.png if options.plot.suffix == ".png" else drawing.svg.encode())
+        write_plot(options.plot, picture(comparison))
     for line in [*lines, *comparison.lines]:
         print(inert(line, lines=False))
     return 0 if comparison.passed else 1

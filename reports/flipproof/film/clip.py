@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flipproof.film.likelihood import Film, Quantity
 from flipproof.film.tracker.reader import read_track_table
 from flipproof.film.tracker.table import METRES, SECONDS, TrackFileError, TrackTable
-from flipproof.output.tables import number_of, read_cells
+from flipproof.output.tables import number_of, numbers_in, read_cells
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
@@ -117,17 +117,12 @@ def read_table(path: Path) -> Film:
     if not available:
         raise ValueError(f"{path}: the header has no column theta or omega{header_text}")
     chosen = available[0]
-    wanted = ("t", *columns_of[chosen])
-    indices = [names.index(name) for name in wanted]
-    numbers = np.array(
-        [[number_of(path, line, name, cells[k]) if cells[k].strip() else np.nan
-          for name, k in zip(wanted, indices, strict=True)] for line, cells in rows]
-    ).reshape(-1, len(wanted))  # fmt: skip
+    numbers = numbers_in(path, names, rows, ("t", *columns_of[chosen]))
     lines = np.array([line for line, _ in rows], dtype=np.int64)
     if "line" in names:
         lines = np.array([int(number_of(path, n, "line", cells[names.index("line")])) for n, cells in rows])
-    filled = np.isfinite(numbers[:, 0]) & np.isfinite(numbers[:, 1:]).any(axis=1)
-    numbers, lines = numbers[filled], lines[filled]
+    used = np.isfinite(numbers[:, 0]) & np.isfinite(numbers[:, 1:]).any(axis=1)
+    numbers, lines = numbers[used], lines[used]
     t = numbers[:, 0]
     if len(t) < MIN_VALUES:
         raise ValueError(f"{path}: {len(t)} rows have a time and a value; {MIN_VALUES} are needed")

@@ -31,7 +31,7 @@ from flipproof.film.estimate import (
 from flipproof.film.fall import fall_after, hand_share
 from flipproof.film.judge import EXCHANGED, Assessment, UnsoundError, shared_draws
 from flipproof.film.likelihood import Film, Held
-from flipproof.film.measured import Measured, hold, read_measured
+from flipproof.film.measured import Measured, hold
 from flipproof.output.tables import read_curve
 from slicemodel import Scenario
 
@@ -601,7 +601,7 @@ def test_every_door_gives_the_same_numbers(tmp_path, poor, capsys, monkeypatch):
     monkeypatch.setattr("flipproof.film.measured.estimate", known_film)
     assert main(["fit", str(out / "track.csv"), *known]) == 0
     assert [line for line in capsys.readouterr().out.splitlines() if line.startswith("  ")] == right
-    assert hold(read_measured(out / "track.csv"), THROW).fits[0].estimate is poor[1].estimate
+    assert hold(read_table(out / "track.csv"), THROW).fits[0].estimate is poor[1].estimate
     for film in asked:
         assert film.t == pytest.approx(poor[0].t, abs=1e-6)
         assert film.values == pytest.approx(np.array([poor[0].cap, poor[0].base]), abs=1e-12, nan_ok=True)
