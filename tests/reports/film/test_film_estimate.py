@@ -587,7 +587,7 @@ def test_every_door_gives_the_same_numbers(tmp_path, poor, capsys, monkeypatch):
     right = [line for line in poor[1].lines() if line.startswith("  ")]
     assert [line for line in capsys.readouterr().out.splitlines() if line.startswith("  ")] == right
     names = {path.name for path in out.iterdir()}
-    assert {"track.csv", "summary.json", "index.html", "film.svg", "allowed.png", "fit.txt"} <= names
+    assert {"track.csv", "summary.json", "index.html", "film.svg", "allowed.png"} <= names
     header = next(line for line in (out / "track.csv").read_text().splitlines() if not line.startswith("#"))
     assert header.split(",") == list(SCHEMA)
     assert set(read_curve(out / "track.csv").series) == {"theta", "omega"}
