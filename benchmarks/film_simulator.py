@@ -22,6 +22,11 @@ class Clip:
     base: np.ndarray
     truth: dict[str, float]
 
+    def film(self) -> Film:
+        """Return what the estimate takes."""
+        values = np.array([self.cap, self.base])
+        return Film(label="film", t=self.t, values=values, quantity="points", lines=np.arange(len(self.t)) + 1)
+
 
 def film(
     rng: np.random.Generator, *, fps: float = 240.0, noise: float = 1e-3, tilt: float = 0.0, filling: float = 0.5,

@@ -19,7 +19,6 @@ import sys
 import time
 import traceback
 from collections import Counter
-from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -32,7 +31,7 @@ from flipproof.film.curves import Equation
 from flipproof.film.estimate import estimate, fit_place
 from flipproof.film.fall import hand_share
 from flipproof.film.judge import Assessment
-from flipproof.film.likelihood import Film, Held, Likelihood
+from flipproof.film.likelihood import Held, Likelihood
 from slicemodel import Scenario
 
 NAMES = ("gamma", "omega0", "release", "tilt", "restitution")
@@ -49,12 +48,6 @@ def cells() -> list[dict[str, Any]]:
              "filling": (0.25, 0.5)[(i + k) % 2]}
         )  # fmt: skip
     return found
-
-
-def film_of(made: film_simulator.Clip) -> Film:
-    """Return a clip as what the estimate takes."""
-    values = np.array([made.cap, made.base])
-    return Film(label="film", t=made.t, values=values, quantity="points", lines=np.arange(len(made.t)))
 
 
 def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int, softness: float = 0.0) -> film_simulator.Clip:
@@ -76,7 +69,7 @@ def coverage(films: int, first: int, slices: int, only: list[int], softness: flo
             made = drawn(np.random.default_rng([index, k]), cell, slices, softness)
             throw = Scenario(water_mass=cell["filling"]).with_slices(slices)
             try:
-                judged = Assessment(estimate(film_of(made), throw))
+                judged = Assessment(estimate(made.film(), throw))
                 judged.check()
             except ValueError as error:
                 refused += 1
@@ -111,7 +104,7 @@ def rough(spoiled: int, noise: int, first: int, slices: int) -> None:
     for k in range(spoiled + noise):
         rng = np.random.default_rng([99, first + k])
         made = drawn(rng, {"fps": (30, 60)[(first + k) % 2], "noise": 1e-3, "tilt": 3.0}, slices)
-        film = (film_simulator.spoiled if k < spoiled else film_simulator.noise)(rng, film_of(made))
+        film = (film_simulator.spoiled if k < spoiled else film_simulator.noise)(rng, made.film())
         try:
             judged = Assessment(estimate(film, Scenario().with_slices(slices)))
             judged.check()
@@ -134,7 +127,7 @@ def widths(films: int, first: int, slices: int) -> None:
         bounds: dict[str, list[float]] = {"gamma": [], "omega0": []}
         for k in range(first, first + films):
             made = drawn(np.random.default_rng([index, k]), cell, slices)
-            film, throw = film_of(made), Scenario(water_mass=cell["filling"]).with_slices(slices)
+            film, throw = made.film(), Scenario(water_mass=cell["filling"]).with_slices(slices)
             for name, ratio in zip(bounds, information_ratios(made, throw), strict=True):
                 bounds[name].append(ratio)
             try:
@@ -167,10 +160,10 @@ def information_ratios(made: film_simulator.Clip, throw: Scenario) -> tuple[floa
         if curve
     ]
     spin = np.array([truth["release"], truth["theta0"] + np.radians(truth["tilt"]), omega0])
-    film = film_of(made)
+    film = made.film()
     x, _ = fit_place(film, curves[0], spin, truth["touch"], throw.bottle.length)
     flying = (film.t >= truth["release"]) & (film.t <= truth["touch"])
-    flight = replace(film, t=film.t[flying], values=film.values[:, flying], lines=film.lines[flying])
+    flight = film.frames(flying)
     likelihood = Likelihood(flight, Held(), truth["touch"], truth["noise"])
     values = [likelihood.model(curve, x)[0] for curve in curves]
     outer = [(values[1] - values[2]) / (2 * change * rate), (values[3] - values[4]) / (2 * change)]
@@ -197,7 +190,7 @@ def releases(films: int) -> None:
             if cell["fps"] == fps:
                 made = drawn(np.random.default_rng([index, k]), cell, 6)
                 release, touch = made.truth["release"] + late / 1e3, made.truth["touch"]
-                hand = hand_share(film_of(made), release, touch, cell["noise"])
+                hand = hand_share(made.film(), release, touch, cell["noise"])
                 total, seen = total + 1, seen + bool(hand and hand.falls)
         print(f"{fps} fps, {late} ms late: {seen} of {total}")
 

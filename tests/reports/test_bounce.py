@@ -412,6 +412,9 @@ def test_engines_of_the_project_have_a_passport(engine):
         (([0.0, 0.1], [1.0, 1.0], [0.0, 0.0]), "ends at"),
         (([0.0, 0.2], [1.0, 1.0, 1.0], [0.0, 0.0]), "shape"),
         (([0.0, 0.2], ["a", "b"], [0.0, 0.0]), "numbers"),
+        ((0.2, [1.0, 1.0], [0.0, 0.0]), "not an array"),
+        (([0.0, [0.1, 0.2]], [1.0, 1.0], [0.0, 0.0]), "inhomogeneous"),
+        (([0.0, 0.2], np.ma.masked_equal([1.0, 2.0], 2.0), [0.0, 0.0]), "masked"),
     ],
 )
 def test_an_answer_that_is_no_flight_is_named(answer, words):

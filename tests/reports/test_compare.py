@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_up import command, refused
 
-from flipproof.check.comparison import claims, compare, table
+from flipproof.check.comparison import compare_flights
 from flipproof.output.tables import Curve, read_curve
 
 TRACK = """t,theta,omega,omega_band,r_cm,measured,in_flight,t_over_T
@@ -48,18 +48,18 @@ def test_of_a_track_the_flight_is_taken_and_empty_cells_are_left_out(tmp_path):
 
 @pytest.mark.parametrize(
     ("first", "second", "quantity", "without"),
-    [("omega", "omega", "omega", {"theta", "r_CM"}), ("theta", "theta", "theta", {"omega", "r_CM"})],
+    [("omega", "omega", "omega", {"theta", "r_cm"}), ("theta", "theta", "theta", {"omega", "r_cm"})],
 )
 def test_two_columns_are_enough(capsys, tmp_path, first, second, quantity, without):
     a = written(tmp_path / "a.csv", f"t,{first}\n0,1\n1,2\n2,3\n")
     b = written(tmp_path / "b.csv", f"{second},t\n1,0\n2.5,1\n3,2\n")
     status, out, _ = flipproof(capsys, a, b)
     assert status == 0
-    size = "50% of omega_0" if quantity == "omega" else "0.5 rad"
-    assert f"largest |difference in {quantity}|: {size} at t = 1 s" in out
+    size = "0.5 of omega_0" if quantity == "omega" else "0.5 rad"
+    assert f"{quantity}: largest difference {size} at t = 1\n" in out
     for name in without:
         assert f"{name} is not compared: {a} and {b} have no values of it" in out
-    assert "compared at 3 times that both have; nothing is interpolated" in out
+    assert "interpolated" not in out
 
 
 def test_small_numbers_keep_their_digits_and_curves_part_at_a_time_that_both_have(capsys, tmp_path):
@@ -78,33 +78,32 @@ def test_curves_are_named_by_their_files(capsys, tmp_path):
 
 
 def test_what_is_interpolated_is_said():
-    found = compare(curve("a", [0, 1, 2, 3], omega=[1, 1, 1, 1]), curve("b", [0, 2, 4], omega=[1, 3, 5]))
-    assert found.apart[0].interpolated == 2
-    np.testing.assert_allclose(found.apart[0].second, [1, 2, 3, 4])
-    assert "compared at 4 times of a; b is interpolated linearly at 2 of them" in table(found)
+    found = compare_flights(curve("a", [0, 1, 2, 3], omega=[1, 1, 1, 1]), curve("b", [0, 2, 4], omega=[1, 3, 5]))
+    np.testing.assert_allclose(found.columns[0].gap.second, [1, 2, 3, 4])
+    assert "(2 of 4 times interpolated, 4 compared)" in found.lines[-1]
 
 
 def test_times_that_were_printed_are_the_same_times():
     t = np.linspace(0, 0.5, 1000)
     printed = np.array([float(f"{time:.15g}") for time in t])
     assert (t != printed).any()
-    found = compare(curve("a", printed, omega=np.cos(t)), curve("b", t, omega=np.cos(t)))
-    assert found.apart[0].interpolated == 0
-    assert found.apart[0].size.max() == 0.0
+    found = compare_flights(curve("a", printed, omega=np.cos(t)), curve("b", t, omega=np.cos(t)))
+    assert found.columns[0].gap.interpolated == 0
+    assert found.columns[0].gap.size.max() == 0.0
 
 
 def test_before_an_event_is_compared_with_before_and_after_with_after():
     jumping = curve("a", [0, 1, 1, 2], theta=[0, 1, 5, 6])
-    same = compare(jumping, curve("b", [0, 0.5, 1, 1, 1, 2], theta=[0, 0.5, 1, 3, 5, 6]))
-    np.testing.assert_array_equal(same.apart[0].size, [0, 0, 0, 0])
-    assert same.apart[0].interpolated == 0
+    same = compare_flights(jumping, curve("b", [0, 0.5, 1, 1, 1, 2], theta=[0, 0.5, 1, 3, 5, 6]))
+    np.testing.assert_array_equal(same.columns[0].gap.size, [0, 0, 0, 0])
+    assert same.columns[0].gap.interpolated == 0
     # A curve that holds every event twice is compared at its first and its last value of a time.
-    again = compare(curve("b", [0, 1, 1, 1, 2], theta=[0, 1, 3, 5, 6]), jumping)
-    np.testing.assert_array_equal(again.apart[0].size, [0, 0, 0, 0])
-    smooth = compare(jumping, curve("b", [0, 2], theta=[0, 2]))
-    np.testing.assert_array_equal(smooth.apart[0].size, [0, 0, 4, 4])
-    single = compare(curve("b", [0, 1, 2], theta=[0, 5, 6]), jumping)
-    np.testing.assert_array_equal(single.apart[0].size, [0, 0, 0])
+    again = compare_flights(curve("b", [0, 1, 1, 1, 2], theta=[0, 1, 3, 5, 6]), jumping)
+    np.testing.assert_array_equal(again.columns[0].gap.size, [0, 0, 0, 0])
+    smooth = compare_flights(jumping, curve("b", [0, 2], theta=[0, 2]))
+    np.testing.assert_array_equal(smooth.columns[0].gap.size, [0, 0, 4, 4])
+    single = compare_flights(curve("b", [0, 1, 2], theta=[0, 5, 6]), jumping)
+    np.testing.assert_array_equal(single.columns[0].gap.size, [0, 0, 0])
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -114,7 +113,8 @@ def test_the_tolerance_sets_the_status_and_the_junit_file(capsys, tmp_path, sign
     for tolerance, status, word, failures in (("0.11", 0, "PASS", "0"), ("0.09", 1, "FAIL", "1")):
         found, out, _ = flipproof(capsys, a, b, "--tolerance", tolerance, "--junit", tmp_path / "x.xml")
         assert found == status
-        assert f"{word}  largest difference in omega between {a} and {b}: 0.1 of omega_0, tolerance {tolerance}" in out
+        sign_of = {"PASS": "≤", "FAIL": ">"}[word]
+        assert f"{word}  difference in omega between {a} and {b}: 0.1 {sign_of} {tolerance}, at t = 1, 2 of 2" in out
         (suite,) = ElementTree.parse(tmp_path / "x.xml").getroot()
         assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("flipproof compare", "1", failures)
     assert flipproof(capsys, a, b)[0] == 0
@@ -122,18 +122,18 @@ def test_the_tolerance_sets_the_status_and_the_junit_file(capsys, tmp_path, sign
 
 
 def test_without_omega_the_tolerance_is_of_theta():
-    found = compare(curve("a", [0, 1], theta=[0, 1], r_cm=[1, 1]), curve("b", [0, 1], theta=[0, 1.5], r_cm=[1, 9]))
-    assert [(claim.id, claim.verdict) for claim in claims(found, 0.4)] == [
+    flights = curve("a", [0, 1], theta=[0, 1], r_cm=[1, 1]), curve("b", [0, 1], theta=[0, 1.5], r_cm=[1, 9])
+    assert [(claim.id, claim.verdict) for claim in compare_flights(*flights, 0.4).findings] == [
         ("compare-theta", "fail"), ("compare-r-cm", "observed"),
     ]  # fmt: skip
-    assert claims(found, 0.6)[0].verdict == "pass"
+    assert compare_flights(*flights, 0.6).findings[0].verdict == "pass"
 
 
 @pytest.mark.parametrize(
     ("first", "second", "words"),
     [
         ("t,omega\n0,1\n1,1\n", "t,theta\n0,1\n1,1\n", "nothing can be compared: "),
-        ("t,omega\n0,1\n1,1\n", "t,omega\n2,1\n3,1\n", "have no common time"),
+        ("t,omega\n0,1\n1,1\n", "t,omega\n2,1\n3,1\n", "has 0 times within those of"),
         ("t,omega\n0,1\n1,1\n", "t,omega\n0.5,1\n3,1\n", "has 1 times within those of"),
         ("t,omega\n0,0\n1,1\n", "t,omega\n0,1\n3,1\n", "omega is 0 at the first time"),
     ],
@@ -160,12 +160,12 @@ def test_a_flight_that_stops_is_said_and_passes_nothing(capsys):
     status, out, _ = flipproof(capsys, *options)
     assert status == 1
     assert re.search(r"published-matlab: overflow: .* its flight counts up to t = 0\.298\d s of 0\.5 s", out)
-    assert "compared until t = 0.298" in out
-    assert re.search(r"^FAIL .* not judged, tolerance 0\.5 \(published-matlab: overflow", out, re.MULTILINE)
+    assert "omega: only t = 0 to 0.298" in out
+    assert re.search(r"^FAIL .* and published-matlab: published-matlab: overflow: slice 11 left", out, re.MULTILINE)
 
 
 def test_releases_that_differ_are_said():
-    found = compare(curve("a", [0, 1, 2], omega=[10, 9, 8]), curve("b", [0, 1, 2], omega=[20, 19, 18]))
+    found = compare_flights(curve("a", [0, 1, 2], omega=[10, 9, 8]), curve("b", [0, 1, 2], omega=[20, 19, 18]))
     assert found.notes[-1] == (
         "at t = 0 s omega is 10 and 20 rad/s; both are divided by 10 rad/s, the first value of a"
     )

@@ -263,10 +263,22 @@ def test_numbers_and_times_have_the_digits_that_tell_them_apart():
     assert any("they part at t = 1700000005.1" in line for line in shifted.lines)
 
 
-@pytest.mark.parametrize("tolerance", [math.nan, -1.0, math.inf, {"y": 1.0}])
+@pytest.mark.parametrize("tolerance", [math.nan, -1.0, -math.inf, {"y": 1.0}])
 def test_a_tolerance_that_is_none_is_refused(tolerance):
     with pytest.raises(ValueError, match="tolerance"):
         compare(of(T), of(T), tolerance=tolerance)
+
+
+def test_of_a_column_with_an_infinite_tolerance_nothing_is_claimed():
+    found = compare(of(0 * T, y=T), of(0 * T + 1, y=T), tolerance={"x": math.inf, "y": 0.0})
+    assert [finding.verdict for finding in found.findings] == ["observed", "pass"]
+    assert found.findings[0].value == 1.0
+    assert [line[:4] for line in found.lines if "between" in line] == ["PASS"]
+
+
+def test_without_any_tolerance_the_largest_difference_is_named():
+    found = compare(of(0 * T), of(T), tolerance=0.0)
+    assert found.findings[0].value == 10.0
 
 
 def test_a_tolerance_beyond_all_change_is_remarked():

@@ -6,7 +6,8 @@ from made_up import refused
 
 import ode_reference
 from flipproof.build import ask_of, build, gather_report
-from flipproof.film.measured import HELD, hold, part_measured, read_measured
+from flipproof.film.clip import read_table
+from flipproof.film.measured import HELD, hold, part_measured
 from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.provenance import provenance
 from flipproof.output.tables import trajectory_csv
@@ -28,7 +29,7 @@ def filmed(path, model, quantity="theta", noise=6e-3):
 def held(tmp_path_factory):
     """Films of two equations beside the solvers, by equation."""
     folder = tmp_path_factory.mktemp("films")
-    return {m: hold(read_measured(filmed(folder / f"{m}.csv", m)), THROW) for m in ("free-flight", "eq8")}
+    return {m: hold(read_table(filmed(folder / f"{m}.csv", m)), THROW) for m in ("free-flight", "eq8")}
 
 
 @pytest.mark.parametrize(("model", "named"), [("free-flight", "free-flight"), ("eq8", "midpoint")])
@@ -65,14 +66,14 @@ def test_a_report_that_is_given_a_measurement_has_a_section_of_it(held, monkeypa
 
 
 def test_a_measured_omega_is_held_too(tmp_path):
-    measurement = read_measured(filmed(tmp_path / "flight.csv", "free-flight", "omega", 0.05))
+    measurement = read_table(filmed(tmp_path / "flight.csv", "free-flight", "omega", 0.05))
     assert (measurement.quantity, len(measurement.t)) == ("omega", 73)
 
 
 def test_a_simulation_is_a_measurement(tmp_path):
     path = tmp_path / "simulated.csv"
     path.write_text(trajectory_csv(ode_reference.solve(THROW, model="eq8")), encoding="utf-8")
-    assert read_measured(path).quantity == "theta"
+    assert read_table(path).quantity == "theta"
 
 
 @pytest.mark.parametrize(

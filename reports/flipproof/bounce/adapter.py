@@ -22,8 +22,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from flipproof.foreign.contract import numbers_of
 from slicemodel.scenario import shortened
 
 FloatArray = NDArray[np.float64]
@@ -70,7 +71,7 @@ class Adapter:
         """
         arguments = map(float, (height, speed, restitution, gravity, dt, duration))
         answer = _answer(self.ask_drop, dict(zip(PARAMETERS, arguments, strict=True)))
-        t, y, v = _arrays(answer, ("t", "y", "v"), (1, 1, 1))
+        t, y, v = _arrays(answer, ("t", "y", "v"))
         _check_times(t, dt, duration)
         return t, y, v
 
@@ -93,9 +94,7 @@ class Adapter:
             "dt": dt,
             "duration": duration,
         }
-        t, x, v = _arrays(_answer(self.ask_line, arguments), ("t", "x", "v"), (1, 2, 2))
-        if x.shape[1] != len(masses):
-            raise AdapterError(f"line: x has {x.shape[1]} columns for {len(masses)} bodies")
+        t, x, v = _arrays(_answer(self.ask_line, arguments), ("t", "x", "v"), len(masses))
         _check_times(t, dt, duration)
         return t, x, v
 
@@ -118,28 +117,17 @@ def _answer(call: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
         ) from error
 
 
-def _arrays(answer: Any, names: Sequence[str], dimensions: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return three arrays of equal length, all finite."""
+def _arrays(answer: Any, names: Sequence[str], *bodies: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the times, shape (P,), and two arrays of shape (P, *bodies), all finite."""
     if not isinstance(answer, Sequence) or len(answer) != 3:
         raise AdapterError(f"the answer is no triple of {', '.join(names)}")
-    arrays = []
-    for name, values, dimension in zip(names, answer, dimensions, strict=True):
-        array = _numbers(name, values)
-        if array.ndim != dimension or len(array) != len(_numbers(names[0], answer[0])):
-            raise AdapterError(f"{name} has shape {array.shape}; t has {len(answer[0])} entries")
-        if not np.isfinite(array).all():
-            raise AdapterError(
-                f"{name}[{int(np.argmin(np.isfinite(array).reshape(len(array), -1).all(1)))}] is not finite"
-            )
-        arrays.append(array)
-    return arrays[0], arrays[1], arrays[2]
-
-
-def _numbers(name: str, values: ArrayLike) -> FloatArray:
     try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise AdapterError(f"{name} is no array of numbers") from None
+        rows = np.size(answer[0])
+        t = numbers_of(names[0], answer[0], (rows,))
+        first, second = (numbers_of(names[k], answer[k], (rows, *bodies)) for k in (1, 2))
+    except ValueError as error:
+        raise AdapterError(str(error)) from None
+    return t, first, second
 
 
 def _check_times(t: FloatArray, dt: float, duration: float) -> None:

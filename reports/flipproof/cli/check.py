@@ -6,7 +6,7 @@ import argparse
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from flipproof.cli.arguments import (
     SCENARIO_HELP,
@@ -27,6 +27,9 @@ from flipproof.cli.arguments import (
 )
 from flipproof.cli.console import tell
 from flipproof.figures.spoken import inert
+
+if TYPE_CHECKING:
+    from flipproof.curves.compare import Comparison
 
 tolerance = reader("a finite number of at least 0", float, lambda value: 0.0 <= value < math.inf)
 
@@ -156,6 +159,11 @@ def _names(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
 
 
+def _names_file(path: Path) -> bool:
+    """Return whether a name is that of a file, there or not; what has a colon is a solver's, such as csv:FILE."""
+    return path.is_file() or ((path.suffix != "" or len(path.parts) > 1) and ":" not in str(path))
+
+
 def _compares_any_system(options: argparse.Namespace) -> bool:
     """Return whether two files are to be compared that need not be throws of a bottle."""
     from flipproof.curves.files import SUFFIXES
@@ -168,9 +176,7 @@ def _compares_any_system(options: argparse.Namespace) -> bool:
             missing = next(path for path in paths if not path.is_file())
             raise ValueError(f"{missing} is no file: --columns, --twin, --from-twins, --shift and --plot compare files")
         for path in paths:
-            if (
-                path.suffix in SUFFIXES and ":" not in str(path) and not path.is_file()
-            ):  # nor a solver, such as csv:FILE
+            if _names_file(path) and not path.exists():
                 raise ValueError(f"{path} is no file")
         return False
     if for_files or any(path.suffix in (".parquet", ".npz", ".nc") for path in paths):
@@ -184,8 +190,8 @@ def _compares_any_system(options: argparse.Namespace) -> bool:
     return True
 
 
-def _compare_curves(options: argparse.Namespace) -> int:
-    """Compare two files of any system; return 1 if they differ, or cannot be compared at any time."""
+def _compare_curves(options: argparse.Namespace) -> Comparison:
+    """Compare two files of any system."""
     from flipproof.curves.compare import TOLERANCE, compare
     from flipproof.curves.files import read
 
@@ -198,40 +204,28 @@ def _compare_curves(options: argparse.Namespace) -> int:
     first, second = (read(name, options.columns) for name in (options.first, options.second))
     twins, twins_of_b = ([read(path, options.columns) for path in paths] for paths in (options.twin, options.twin_of_b))
     allowed = None if options.from_twins else TOLERANCE if options.tolerance is None else options.tolerance
-    comparison = compare(
+    return compare(
         first, second, twins=twins, twins_of_second=twins_of_b, columns=options.columns, tolerance=allowed,
         shift=options.shift or 0.0,
     )  # fmt: skip
-    write_json(options.json, comparison.to_mapping())
-    write_junit(options.junit, comparison.findings, "flipproof compare")
-    if options.plot:
-        from flipproof.curves import figure
-
-        write_picture(options.plot, figure.picture(comparison))
-    for line in comparison.lines:
-        tell(line)
-    return 0 if comparison.passed else 1
 
 
-def command_compare(options: argparse.Namespace) -> int:
-    """Compare two solvers or files and print the differences; return 1 if they exceed the tolerance."""
-    if _compares_any_system(options):
-        return _compare_curves(options)
-    if options.junit and options.tolerance is None:
-        raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
-    from flipproof.check.comparison import claims, compare, table
+def _compare_flights(options: argparse.Namespace) -> tuple[Comparison, list[str]]:
+    """Compare two solvers or files of throws; also return what is printed of the throws, in lines."""
+    from flipproof.check.comparison import compare_flights, ends
     from flipproof.frame.solvers import find
     from flipproof.frame.timing import solve_timed
     from flipproof.frame.twins import TRUSTED, doubt
     from flipproof.output.tables import Curve, read_curve
 
+    if options.junit and options.tolerance is None:
+        raise ValueError(f"--junit {options.junit} needs --tolerance: without it no comparison can fail")
     scenario = read_scenario(options.scenario, options.slices, 50)
     stopped: list[str] = []
     flown: list[str] = []
 
     def load(name: str) -> Curve:
-        path = Path(name)
-        if path.is_file() or ((path.suffix or "/" in name) and ":" not in name):
+        if _names_file(path := Path(name)):
             return read_curve(path)
         run, seconds = solve_timed(find(name).name, scenario)
         flown.append(name)
@@ -243,18 +237,26 @@ def command_compare(options: argparse.Namespace) -> int:
             warnings.append(f"{stopped[-1]}; its flight counts up to t = {run.t[-1]:.4g} s of {scenario.duration:g} s")
         return replace(Curve.of(run), notes=tuple(filter(None, warnings)))
 
-    comparison = compare(load(options.first), load(options.second))
-    if flown:
-        tell(f"{' and '.join(dict.fromkeys(flown))}: N = {scenario.n_slices} slices")
-    print(inert(table(comparison)))
+    first, second = load(options.first), load(options.second)
     allowed = math.inf if options.tolerance is None else options.tolerance
-    findings = claims(comparison, allowed, "; ".join(stopped))
-    write_json(options.json, {**comparison.to_mapping(), "findings": [finding.to_mapping() for finding in findings]})
-    if options.tolerance is None:
-        return 0
-    write_junit(options.junit, findings, "flipproof compare")
-    first = findings[0]
-    status = "FAIL" if first.failed else "PASS"
-    size = "not judged" if first.value is None else f"{first.value:.6g} {first.unit}"
-    tell(f"{status}  {first.title}: {size}, tolerance {options.tolerance:g} ({first.note})")
-    return 1 if first.failed else 0
+    comparison = compare_flights(first, second, allowed, "; ".join(stopped))
+    cut = [f"{' and '.join(dict.fromkeys(flown))}: N = {scenario.n_slices} slices"] if flown else []
+    return comparison, [*cut, *ends(comparison, first)]
+
+
+def command_compare(options: argparse.Namespace) -> int:
+    """Compare two solvers or files and print the differences; return 1 if they differ, or cannot be compared."""
+    lines: list[str] = []
+    if _compares_any_system(options):
+        comparison = _compare_curves(options)
+    else:
+        comparison, lines = _compare_flights(options)
+    write_json(options.json, comparison.to_mapping())
+    write_junit(options.junit, comparison.findings, "flipproof compare")
+    if options.plot:
+        from flipproof.curves import figure
+
+        write_picture(options.plot, figure.picture(comparison))
+    for line in [*lines, *comparison.lines]:
+        tell(line)
+    return 0 if comparison.passed else 1

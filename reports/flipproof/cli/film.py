@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flipproof.cli.arguments import (
     SCENARIO_HELP,
@@ -23,6 +23,10 @@ from flipproof.cli.arguments import (
 from flipproof.cli.console import say
 from flipproof.cli.progress import progress_bar
 
+if TYPE_CHECKING:
+    from flipproof.film.estimate import Estimate
+    from flipproof.film.likelihood import Film
+
 
 def add_film(commands: Any) -> None:
     """Add the three commands."""
@@ -34,7 +38,7 @@ def add_film(commands: Any) -> None:
         "File), or a track.csv",
     )  # fmt: skip
     _add_film_arguments(track)
-    track.set_defaults(kind="track", model=["free-flight"], quantity=None, minutes=10.0)
+    track.set_defaults(kind="track", model=["free-flight"], minutes=10.0)
 
     export = add_command(
         commands, "export", "Write a simulation as a table that Tracker lays over a video.", command_export
@@ -62,7 +66,6 @@ def add_film(commands: Any) -> None:
         "--model", nargs="+", default=["free-flight"], metavar="NAME", help="equations to fit and compare, see "
         "'flipproof models'; midpoint solves eq8 in steps of 0.5 ms (default free-flight)",
     )  # fmt: skip
-    fit.add_argument("--quantity", choices=("points", "theta", "omega"), help="what to fit (default: points, if any)")
     fit.add_argument(
         "--each", action="store_true", help="every FILE is a film of the same bottle: gamma and restitution are shared"
     )
@@ -121,7 +124,8 @@ def command_film(options: argparse.Namespace) -> int:
     groups = [(path,) for path in options.files] if each_film else [tuple(options.files)]
     films: list[list[Assessment]] = []
     for paths in groups:
-        assessments = ranked([Assessment(_estimate(options, paths, scenario, name)) for name in options.model])
+        film = _film(options, paths)
+        assessments = ranked([Assessment(_estimate(options, film, scenario, name)) for name in options.model])
         try:
             assessments[0].check()
         except UnsoundError as error:
@@ -150,36 +154,30 @@ def command_film(options: argparse.Namespace) -> int:
     return 0
 
 
-def _estimate(options: argparse.Namespace, paths: tuple[Path, ...], scenario: Any, solver: str) -> Any:
+def _film(options: argparse.Namespace, paths: tuple[Path, ...]) -> Film:
     from flipproof.film.clip import read_film
+
+    return read_film(
+        paths, cap=options.cap, base=options.base, length_unit=options.length_unit, time_unit=options.time_unit,
+        frame_rate=options.frame_rate,
+    )  # fmt: skip
+
+
+def _estimate(options: argparse.Namespace, film: Film, scenario: Any, solver: str) -> Estimate:
     from flipproof.film.estimate import estimate
     from flipproof.film.likelihood import Held
 
-    film = read_film(
-        paths, cap=options.cap, base=options.base, length_unit=options.length_unit, time_unit=options.time_unit,
-        frame_rate=options.frame_rate, quantity=options.quantity,
-    )  # fmt: skip
-    release = film.release if options.release is None else options.release
-    if release is not None and options.landing is not None and not release < options.landing:
-        raise ValueError(f"landing = {options.landing:g} s does not follow release = {release:g} s")
+    if None not in (options.release, options.landing) and not options.release < options.landing:
+        raise ValueError(f"landing = {options.landing:g} s does not follow release = {options.release:g} s")
     held = Held(
-        release=release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
+        release=options.release, touch=options.landing, table=options.table_height, tilt="tilt" in options.hold,
         scale="scale" in options.hold, noise=options.noise,
     )  # fmt: skip
     with progress_bar(solver, "flight") as step:
-        seconds = 60.0 * options.minutes
-        return estimate(film, scenario, solver, held, slices=options.slices, seconds=seconds, tick=_counter(step))
-
-
-def _counter(step: Callable[..., None]) -> Callable[[int], object]:
-    n_flights = 0
-
-    def tick(flights: int) -> None:
-        nonlocal n_flights
-        n_flights += flights
-        step(n_flights, None)
-
-    return tick
+        return estimate(
+            film, scenario, solver, held, slices=options.slices, seconds=60.0 * options.minutes,
+            tick=lambda flights: step(flights, None),
+        )  # fmt: skip
 
 
 def _shared_lines(draws: Mapping[str, Any], agreement: str) -> list[str]:

@@ -230,9 +230,9 @@ def command_report(options: argparse.Namespace) -> int:
     check_guests(options.guests)
     measurement = None
     if options.measured is not None:
-        from flipproof.film.measured import read_measured
+        from flipproof.film.clip import read_table
 
-        measurement = read_measured(options.measured)
+        measurement = read_table(options.measured)
 
     from flipproof.build import ask_of, build, gather_report, write
     from flipproof.chapters import parts

@@ -29,7 +29,7 @@ from flipproof.curves.events import Jumps, Matched, match, median_step
 from flipproof.curves.files import Curves
 from flipproof.curves.gap import Gap, gap
 from flipproof.curves.growth import Growth, first_crossing, fit_growth
-from flipproof.frame.findings import Band, Finding, finite_or_none, regression
+from flipproof.frame.findings import Band, Finding, finite_or_none, observed, regression
 from slicemodel.trajectory import FloatArray
 
 SAFETY: Final = 2.0
@@ -50,9 +50,10 @@ class Column:
     ----------
     band : (K,) - of the difference, from twins; zero without any
     known : (K,) - where the band is at most half the tolerance
-    tolerance : in the unit of the column; 0 where the twins alone decide
+    tolerance : in the unit of the column; 0 where the twins alone decide, inf where nothing is claimed
     growth : of the twins' change, up to where it exceeds the tolerance
     last_digit : when a change of the first row by one unit in the last place exceeds the tolerance; None: not known
+    unit : of the values, if it is known
     """
 
     name: str
@@ -62,6 +63,7 @@ class Column:
     tolerance: float
     growth: Growth
     last_digit: float | None
+    unit: str = ""
 
     @cached_property
     def comparable(self) -> NDArray[np.bool_]:
@@ -106,7 +108,7 @@ class Column:
         if self.reason and not self.inadmissible.any():
             return None
         with np.errstate(all="ignore"):
-            ratio = np.nan_to_num(self.gap.size / self.allowed, posinf=np.inf)
+            ratio = np.nan_to_num(self.gap.size / np.maximum(self.allowed, 1e-300), posinf=np.inf)
         return int(np.where(judged, ratio, -1.0).argmax())
 
     @property
@@ -123,13 +125,17 @@ class Column:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """A comparison of two runs; ``events`` are those of both, ``notes`` what was left out."""
+    """A comparison of two runs.
+
+    ``events`` are those of both, ``notes`` what was left out; if a run was ``stopped``, in words why, none agree.
+    """
 
     first: str
     second: str
     columns: tuple[Column, ...]
     events: Matched
     notes: tuple[str, ...]
+    stopped: str = ""
 
     @property
     def passed(self) -> bool:
@@ -148,13 +154,21 @@ class Comparison:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """One claim per column: its difference is admissible wherever it can be compared."""
+        """One claim per column: its difference is admissible wherever it can be compared.
+
+        Of a column with an infinite tolerance the largest difference is observed.
+        """
         findings = []
         for column in self.columns:
             id_, k = f"compare-{_slug(column.name)}", column.worst
             title = f"difference in {column.name} between {self.first} and {self.second}"
-            if k is None:
-                findings.append(regression(id_, title, None, "", (0.0, column.tolerance), column.reason))
+            if math.isinf(column.tolerance):
+                largest, time = float(column.gap.size[column.largest]), column.gap.t[column.largest]
+                findings.append(observed(id_, title, largest, column.unit, f"at t = {time:.{self.digits}g}"))
+                continue
+            if k is None or self.stopped:
+                reason = self.stopped or column.reason
+                findings.append(regression(id_, title, None, column.unit, (0.0, column.tolerance), reason))
                 continue
             count = int(column.comparable.sum())
             note = f"at t = {column.gap.t[k]:.{self.digits}g}, {count} of {len(column.gap.t)} times compared"
@@ -164,7 +178,7 @@ class Comparison:
                 note += "; this is none of them: twice the error of interpolation is admissible there"
             value, allowed = float(column.gap.size[k]), float(column.allowed[k])
             band = Band(float(column.band[k]), "twins") if column.band[k] else None
-            findings.append(regression(id_, title, value, "", (0.0, allowed), note, band=band))
+            findings.append(regression(id_, title, value, column.unit, (0.0, allowed), note, band=band))
         return tuple(findings)
 
     @property
@@ -180,7 +194,8 @@ class Comparison:
         lines, digits = list(self.notes), self.digits
         for column in self.columns:
             gap, k = column.gap, column.largest
-            text = f"{column.name}: largest difference {gap.size[k]:.3g} at t = {gap.t[k]:.{digits}g}"
+            size = f"{gap.size[k]:.3g} {column.unit}".strip()
+            text = f"{column.name}: largest difference {size} at t = {gap.t[k]:.{digits}g}"
             if gap.interpolated:
                 text += f" ({gap.interpolated} of {len(gap.t)} times interpolated, {column.comparable.sum()} compared)"
             if column.band.any():
@@ -203,6 +218,8 @@ class Comparison:
                 text += f", after the event at t = {event[0]:.{digits}g} {event[1]}"
             lines.append(text)
         for finding in self.findings:
+            if finding.kind == "observation":
+                continue
             numbers = "" if finding.value is None else f"{_apart(finding.value, finding.admissible[1])}, "
             lines.append(f"{'FAIL' if finding.failed else 'PASS'}  {finding.title}: {numbers}{finding.note}")
         return [line.replace("\n", r"\n") for line in lines]
@@ -222,7 +239,8 @@ class Comparison:
                     "column": column.name,
                     "largest": float(column.gap.size[column.largest]),
                     "time": float(column.gap.t[column.largest]),
-                    "tolerance": column.tolerance,
+                    "unit": column.unit,
+                    "tolerance": finite_or_none(column.tolerance),
                     "horizon": column.horizon,
                     "growth_rate": finite_or_none(column.growth.rate),
                     "growth_error": finite_or_none(column.growth.error),
@@ -254,7 +272,8 @@ def compare(
     ----------
     twins, twins_of_second : runs that ought to be the first and the second
     columns : those to compare; None: all columns that every run has
-    tolerance : admissible difference in the unit of the column, or by column; None: the twins alone decide
+    tolerance : admissible difference in the unit of the column, or by column; None: the twins alone decide; inf:
+        nothing is claimed of the column
     shift : by how much a jump may be early or late, beyond one step of the output and what the twins show
 
     Raises
@@ -279,8 +298,8 @@ def compare(
         for name in shared
     }
     for name, value in tolerances.items():
-        if not 0.0 <= value < math.inf:
-            raise ValueError(f"tolerance = {value!r} of {name} is outside [0, inf)")
+        if not value >= 0.0:
+            raise ValueError(f"tolerance = {value!r} of {name} is no number of 0 or more")
     notes = [
         f"{name or 'a column without a name'} is not compared: not every run has it, in the length of its times"
         for name in dict.fromkeys(name for run in runs for name in run.columns)
@@ -302,7 +321,7 @@ def compare(
             if all(np.array_equal(twin.columns[name], run.columns[name]) for name in shared):
                 notes.append(f"{twin.label} is equal to {run.label}: it shows nothing")
     for name, value in tolerances.items():
-        if value > (size := float(max(np.ptp(run.columns[name]) for run in (first, second)))) > 0.0:
+        if math.inf > value > (size := float(max(np.ptp(run.columns[name]) for run in (first, second)))) > 0.0:
             notes.append(f"{name}: the tolerance, {value:g}, exceeds all of its change, {size:.3g}")
     compared = [
         _column(name, first, second, twins, twins_of_second, value, shift) for name, value in tolerances.items()

@@ -13,7 +13,7 @@ from slicemodel.scenario import shortened, unknown_name
 from slicemodel.trajectory import FloatArray
 
 TIMES: Final = ("t", "time", "Time", "t_s")
-"""Columns that hold the time unless another is named."""
+"""Columns that may hold the time; the first that is there does."""
 
 SUFFIXES: Final = (".csv", ".parquet", ".npz", ".nc")
 
@@ -40,7 +40,6 @@ def curves(
     label: str,
     table: Mapping[str, Any],
     columns: Sequence[str] | None = None,
-    time: str | None = None,
     t_events: Any = None,
 ) -> Curves:
     """Return the columns of a table as curves.
@@ -48,7 +47,6 @@ def curves(
     Parameters
     ----------
     columns : names of those to compare; None: all columns of real numbers as long as that of the time
-    time : name of the column of times; None: the first of ``TIMES`` that is there
 
     Raises
     ------
@@ -57,13 +55,12 @@ def curves(
         finite, too short, or goes back in time
     """
     names = [str(name) for name in table]
+    time = next((name for name in TIMES if name in names), None)
     if time is None:
-        time = next((name for name in TIMES if name in names), None)
-        if time is None:
-            raise ValueError(
-                f"{label}: has no column {' or '.join(TIMES[:2])}; it has {shortened(', '.join(names), 80) or 'none'}"
-            )
-    for name in (time, *(columns or ())):
+        raise ValueError(
+            f"{label}: has no column {' or '.join(TIMES[:2])}; it has {shortened(', '.join(names), 80) or 'none'}"
+        )
+    for name in columns or ():
         if name not in names:
             raise ValueError(f"{label}: {unknown_name('column', name, names)}")
     t = _numbers(label, time, table[time])
@@ -114,7 +111,7 @@ def _number(label: str, name: str, row: int, value: Any) -> float:
         raise ValueError(f"{label}: row {row}, column {name!r}: {problem}") from None
 
 
-def read(path: Path | str, columns: Sequence[str] | None = None, time: str | None = None) -> Curves:
+def read(path: Path | str, columns: Sequence[str] | None = None) -> Curves:
     """Read a CSV, Parquet, NPZ or NetCDF file as ``curves`` does; an array ``t_events`` of an NPZ file is its events.
 
     Raises ValueError, naming the file and what is wrong with it; Parquet needs pandas, NetCDF xarray.
@@ -131,14 +128,14 @@ def read(path: Path | str, columns: Sequence[str] | None = None, time: str | Non
         if hint := other_separator(names):
             raise ValueError(f"{path}: {hint}")
         cells = list(zip(*(row for _, row in rows), strict=True)) or [()] * len(names)
-        return curves(str(path), dict(zip(names, cells, strict=True)), columns, time)
+        return curves(str(path), dict(zip(names, cells, strict=True)), columns)
     try:
         table = _binary(path)
     except ImportError as error:
         raise ValueError(f"{path}: reading {path.suffix} needs {error.name or 'a package'}, which is missing") from None
     except Exception as error:  # every library has its own errors for a file that is not what its name says
         raise ValueError(f"{path}: cannot be read as {path.suffix} ({shortened(str(error), 120)})") from None
-    return curves(str(path), table, columns, time, table.get("t_events"))
+    return curves(str(path), table, columns, table.get("t_events"))
 
 
 def _binary(path: Path) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flipproof.film.likelihood import Film, Quantity
 from flipproof.film.tracker.reader import read_track_table
 from flipproof.film.tracker.table import METRES, SECONDS, TrackFileError, TrackTable
-from flipproof.output.tables import number_of, read_cells
+from flipproof.output.tables import number_of, numbers_in, read_cells
 from slicemodel.scenario import shortened
 from slicemodel.trajectory import FloatArray
 
@@ -65,7 +65,6 @@ def read_film(
     length_unit: str = "",
     time_unit: str = "s",
     frame_rate: float | None = None,
-    quantity: Quantity | None = None,
 ) -> Film:
     """Return the film in files: with ``cap`` and ``base`` exports of one clip by Tracker, else one CSV table.
 
@@ -74,7 +73,6 @@ def read_film(
     cap, base : names of the tracks of an export
     length_unit, time_unit : m and s by default; the headings of an export may state the unit of length instead
     frame_rate : at which the film was recorded [1/s], if its times are in slow motion
-    quantity : what to take from a table that has points, theta and omega; the first of these by default
 
     Raises
     ------
@@ -95,18 +93,17 @@ def read_film(
             "several files: name the tracks by --cap and --base if they are Tracker's of one clip; fit --each takes "
             "several films of one bottle"
         )
-    film = read_table(paths[0], quantity)
+    film = read_table(paths[0])
     if length_unit not in ("", *METRES):
         raise ValueError(f"length_unit = {length_unit!r} is unknown; known: {', '.join(METRES)}")
     if length_unit and film.quantity != "points":
         raise ValueError(f"--length-unit is that of points; {paths[0]} is a table of {film.quantity}")
     seconds = SECONDS[time_unit] if frame_rate is None else 1.0 / (frame_rate * float(np.median(np.diff(film.t))))
-    release = None if film.release is None else film.release * seconds
-    return replace(film, t=film.t * seconds, values=film.values * METRES[length_unit or "m"], release=release)
+    return replace(film, t=film.t * seconds, values=film.values * METRES[length_unit or "m"])
 
 
-def read_table(path: Path, quantity: Quantity | None = None) -> Film:
-    """Return the points of a track.csv, or theta or omega from the release of any CSV with t in seconds."""
+def read_table(path: Path) -> Film:
+    """Return the points of a track.csv, or theta or else omega from the release of any CSV with t in seconds."""
     names, rows = read_cells(path)
     columns_of: dict[Quantity, tuple[str, ...]] = {"points": POINT_COLUMNS, "theta": ("theta",), "omega": ("omega",)}
     available = [kind for kind, columns in columns_of.items() if set(columns) <= set(names)]
@@ -117,23 +114,15 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
         raise ValueError(
             f"{path}: the header has no column t{header_text}; an export of Tracker needs --cap and --base"
         )
-    if not available or (quantity and quantity not in available):
-        raise ValueError(f"{path}: the header has no column {quantity or 'theta or omega'}{header_text}")
-    chosen = quantity or available[0]
-    wanted = ("t", *columns_of[chosen])
-    indices = [names.index(name) for name in wanted]
-    numbers = np.array(
-        [[number_of(path, line, name, cells[k]) if cells[k].strip() else np.nan
-          for name, k in zip(wanted, indices, strict=True)] for line, cells in rows]
-    ).reshape(-1, len(wanted))  # fmt: skip
-    flight, release = (None, None) if chosen == "points" else _flight_of_track(path, names, rows)
-    if flight is not None:
-        rows, numbers = [row for row, flies in zip(rows, flight, strict=True) if flies], numbers[flight]
+    if not available:
+        raise ValueError(f"{path}: the header has no column theta or omega{header_text}")
+    chosen = available[0]
+    numbers = numbers_in(path, names, rows, ("t", *columns_of[chosen]))
     lines = np.array([line for line, _ in rows], dtype=np.int64)
     if "line" in names:
         lines = np.array([int(number_of(path, n, "line", cells[names.index("line")])) for n, cells in rows])
-    filled = np.isfinite(numbers[:, 0]) & np.isfinite(numbers[:, 1:]).any(axis=1)
-    numbers, lines = numbers[filled], lines[filled]
+    used = np.isfinite(numbers[:, 0]) & np.isfinite(numbers[:, 1:]).any(axis=1)
+    numbers, lines = numbers[used], lines[used]
     t = numbers[:, 0]
     if len(t) < MIN_VALUES:
         raise ValueError(f"{path}: {len(t)} rows have a time and a value; {MIN_VALUES} are needed")
@@ -146,14 +135,8 @@ def read_table(path: Path, quantity: Quantity | None = None) -> Film:
         values = np.array([numbers[:, 1:3], numbers[:, 3:5]])
         return Film(label=path.name, t=t, values=values, quantity=chosen, lines=lines, notes=("a track.csv",))
     _check_turning(path, chosen, numbers[:, 1], lines)
-    note = (
-        f"a table of {chosen}: its first row is the release unless --release says otherwise"
-        if release is None
-        else f"{chosen} of a track.csv, from its release to its touch"
-    )
-    return Film(
-        label=path.name, t=t, values=numbers[None, :, 1:], quantity=chosen, lines=lines, notes=(note,), release=release
-    )
+    note = f"a table of {chosen}: its first row is the release unless --release says otherwise"
+    return Film(label=path.name, t=t, values=numbers[None, :, 1:], quantity=chosen, lines=lines, notes=(note,))
 
 
 def _check_turning(path: Path, quantity: str, values: FloatArray, lines: NDArray[np.int64]) -> None:
@@ -172,24 +155,6 @@ def _check_turning(path: Path, quantity: str, values: FloatArray, lines: NDArray
             f"{path}: theta jumps by {values[k + 1] - values[k]:.3g} rad, about a whole turn, at line {lines[k + 1]}: "
             "count its turns, as numpy.unwrap does"
         )
-
-
-def _flight_of_track(
-    path: Path, names: Sequence[str], rows: Sequence[tuple[int, Sequence[str]]]
-) -> tuple[NDArray[np.bool_] | None, float | None]:
-    """Return which rows of a track.csv fly and the release that its t_over_T states [s]; None of another table."""
-    wanted = ("t", "in_flight", "t_over_T")
-    if not set(wanted) <= set(names):
-        return None, None
-    columns = [names.index(name) for name in wanted]
-    t, flies, share = np.array(
-        [[number_of(path, line, name, cells[k]) if cells[k].strip() else np.nan
-          for name, k in zip(wanted, columns, strict=True)] for line, cells in rows]
-    ).T  # fmt: skip
-    known = np.isfinite(t) & np.isfinite(share)
-    if known.sum() < 2:
-        return flies == 1.0, None
-    return flies == 1.0, float(np.polyfit(share[known], t[known], 1)[1])
 
 
 def _from_tracks(table: TrackTable, cap: str, base: str, unit: str, time_unit: str, frame_rate: float | None) -> Film:

@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Any, Final
 
@@ -183,7 +184,7 @@ def estimate(
     throw : what is known: bottle, water, gravity; the rest is fitted
     slices : of the equation; ``SLICES`` or the throw's, if fewer, by default
     seconds : after which the grid is not refined further; the estimate is then not ``complete``
-    tick : called with the number of flights made
+    tick : called with the number of flights that a search has made so far
 
     Raises
     ------
@@ -238,7 +239,7 @@ def _estimate_from(
     def count(flights: int) -> None:
         nonlocal n_flights
         n_flights += flights
-        tick(flights)
+        tick(n_flights)
 
     reach = max(1.4 * abs(x[2]) * (film.t[-1] - x[0]) for _, _, x in starts) + 0.5  # the touch may turn out later
     equation = Equation(solver, sliced, float(np.clip(reach, 2.0, 60.0)), film.quantity == "points", count)
@@ -274,14 +275,13 @@ def near_flight(film: Film, likelihood: Likelihood, release: float, after: float
     """Return the likelihood of a film's frames in flight and of those around it, which determine its ends."""
     last = likelihood.touch + max(after, 4 * float(np.median(np.diff(film.t))))
     near = (film.t >= release - REACH) & (film.t <= last)
-    nearby = replace(film, t=film.t[near], values=film.values[:, near], lines=film.lines[near])
-    return likelihood.replaced(film=nearby)
+    return likelihood.replaced(film=film.frames(near))
 
 
 # ---------------------------------------------------------------------- the grid over gamma and e
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Grid:
     """Cells over the coordinates of gamma / |omega_0| and e.
 
@@ -296,15 +296,31 @@ class Grid:
     curves: list[Curve]
     fits: list[Fit]
 
-    @property
+    @cached_property
     def log_densities(self) -> FloatArray:
         """Logarithm of the density of the data at every node, (C,)."""
         return np.array([fit.evidence for fit in self.fits])
 
     @property
+    def order(self) -> NDArray[np.int64]:
+        """Nodes by their density, the likeliest first, (C,)."""
+        return np.argsort(-self.log_densities)
+
+    @property
+    def matters(self) -> NDArray[np.bool_]:
+        """Whether a node is likely enough not to be left out, (C,)."""
+        return np.asarray(self.log_densities > self.log_densities[self.order[0]] - NEGLIGIBLE)
+
+    @property
     def log_masses(self) -> FloatArray:
         """Logarithm of its integral over every cell, (C,)."""
         return np.asarray(self.log_densities + np.log(self.cells).sum(axis=1))
+
+
+def _curves_at(likelihood: Likelihood, equation: Equation, nodes: FloatArray, x: FloatArray) -> list[Curve | None]:
+    """Return the curves at nodes (C, 2) of the grid, for the spin and the tilt among the inner parameters."""
+    rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
+    return equation.curves(rates, float(x[2]), float(x[1]) - likelihood.tilt(x))
 
 
 def _adaptive_grid(
@@ -322,9 +338,7 @@ def _adaptive_grid(
         nodes = np.array(list(product(*axes)))
         x = seed_x[0]
         likelihood = near_flight(film, likelihood, float(x[0]))
-        tilt = float(np.arctan2(x[7], -x[8])) if likelihood.planar else 0.0
-        rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
-        solved = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
+        solved = _curves_at(likelihood, equation, nodes, x)
         nodes = nodes[[curve is not None for curve in solved]]
         curves = [curve for curve in solved if curve is not None]
         if not curves:
@@ -332,49 +346,45 @@ def _adaptive_grid(
         initial = [seed_x[int(np.nanargmin(((seeds - node) ** 2 / (cell**2)).sum(axis=1)))] if len(seed_x) > 1 else x
                 for node in nodes]  # fmt: skip
         fits = [likelihood.fitted(curve, start) for curve, start in zip(curves, initial, strict=True)]
-        log_densities = np.array([fit.evidence for fit in fits])
-        order = np.argsort(-log_densities)
-        best = int(order[0])
+        grid = Grid(nodes, np.broadcast_to(cell, nodes.shape), curves, fits)
         if time.perf_counter() - start_time > 0.5 * seconds:
             break
         if shape == FINE:
             # Rows of a coarse grid miss a narrow ridge, which then looks shorter than it is.
-            extended = _extended_box(nodes, log_densities, cell, (low, high))
+            extended = _extended_box(grid, (low, high))
             if np.array_equal(extended, (low, high)):
                 break
             low, high = extended
-            seeds, seed_x = nodes[order], [fits[k].x for k in order]
+            seeds, seed_x = nodes[grid.order], [fits[k].x for k in grid.order]
             continue
+        best = grid.order[0]
         settled = settle(likelihood, curves[best], fits[best].x)
         if settled is not likelihood:
             likelihood = settled
             fits = [likelihood.fitted(curve, fit.x) for curve, fit in zip(curves, fits, strict=True)]
-            log_densities = np.array([fit.evidence for fit in fits])
-            order = np.argsort(-log_densities)
-            best = int(order[0])
+            grid = replace(grid, fits=fits)
         margin = cell
-        if (log_densities > log_densities[best] - NEGLIGIBLE).sum() <= MIN_RELEVANT:
+        if grid.matters.sum() <= MIN_RELEVANT:
             # What matters is smaller than a cell: descents from several nodes find it. The first start from the best
             # of each row of e, across which one rebound more or less folds the likelihood.
-            _, first = np.unique(nodes[order, 1], return_index=True)
-            for k in order[:3] if descended else order[first]:
+            _, first = np.unique(nodes[grid.order, 1], return_index=True)
+            for k in grid.order[:3] if descended else grid.order[first]:
                 trials = _descent(likelihood, equation, nodes[k], fits[k].x, cell, (low, high))
                 nodes = np.concatenate((nodes, [trial[0] for trial in trials]))
                 curves += [trial[1] for trial in trials]
                 fits += [trial[2] for trial in trials]
             descended = True
-            log_densities = np.array([fit.evidence for fit in fits])
-            order = np.argsort(-log_densities)
-            best, margin = int(order[0]), 0.3 * cell
-        relevant = np.union1d(np.flatnonzero(log_densities > log_densities[best] - NEGLIGIBLE), order[:3])
-        seeds, seed_x = nodes[order], [fits[k].x for k in order]
+            grid = Grid(nodes, np.broadcast_to(cell, nodes.shape), curves, fits)
+            margin = 0.3 * cell
+        relevant = np.union1d(np.flatnonzero(grid.matters), grid.order[:3])
+        seeds, seed_x = nodes[grid.order], [fits[k].x for k in grid.order]
         width = high - low
         low = np.maximum(low, nodes[relevant].min(axis=0) - margin)
         high = np.minimum(high, nodes[relevant].max(axis=0) + margin)
         if np.prod((high - low) / width) > 0.4:
             shape = FINE
             likelihood = likelihood.replaced(rest=LAST)
-    return likelihood, Grid(nodes, np.broadcast_to(cell, nodes.shape), curves, fits), shape == FINE
+    return likelihood, grid, shape == FINE
 
 
 def _effective_cells(grid: Grid) -> float:
@@ -404,10 +414,7 @@ def _refine(likelihood: Likelihood, equation: Equation, grid: Grid, deadline: fl
         quarters = np.array(list(product((-0.25, 0.25), repeat=2)))
         nodes = (grid.nodes[cut, None] + quarters * grid.cells[cut, None]).reshape(-1, 2)
         parents = [grid.fits[k].x for k in np.repeat(cut, 4)]
-        x = grid.fits[int(np.argmax(grid.log_densities))].x
-        tilt = float(np.arctan2(x[7], -x[8])) if likelihood.planar else 0.0
-        rates = np.column_stack((SCALE * np.sinh(nodes[:, 0]), nodes[:, 1]))
-        solved = equation.curves(rates, float(x[2]), float(x[1]) - tilt)
+        solved = _curves_at(likelihood, equation, nodes, grid.fits[int(np.argmax(grid.log_densities))].x)
         successes = [k for k, curve in enumerate(solved) if curve is not None]
         curves = [curve for curve in solved if curve is not None]
         grid = Grid(
@@ -420,13 +427,12 @@ def _refine(likelihood: Likelihood, equation: Equation, grid: Grid, deadline: fl
     return grid
 
 
-def _extended_box(
-    nodes: FloatArray, log_densities: FloatArray, cell: FloatArray, box: tuple[FloatArray, FloatArray]
-) -> tuple[FloatArray, FloatArray]:
+def _extended_box(grid: Grid, box: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return the box, extended by half its length beyond each edge whose outermost row is likely."""
     low, high = box[0].copy(), box[1].copy()
+    cell = grid.cells[0]
     for k, limit in enumerate((np.arcsinh(MAX_RATE / SCALE), 1.0)):
-        likely = nodes[log_densities > log_densities.max() - EDGE, k]
+        likely = grid.nodes[grid.log_densities > grid.log_densities.max() - EDGE, k]
         length = high[k] - low[k]
         if likely.min() < low[k] + cell[k]:
             low[k] = max(0.0, low[k] - 0.5 * length)
@@ -470,11 +476,9 @@ def _descent(
 ) -> list[tuple[FloatArray, Curve, Fit]]:
     """Return the trials of Nelder and Mead's simplex from a node; it needs no slopes, which have folds."""
     trials: list[tuple[FloatArray, Curve, Fit]] = []
-    tilt = float(np.arctan2(x[7], -x[8])) if likelihood.planar else 0.0
 
     def objective(point: FloatArray) -> float:
-        rate = np.array([[SCALE * np.sinh(point[0]), point[1]]])
-        (curve,) = equation.curves(rate, float(x[2]), float(x[1]) - tilt)
+        (curve,) = _curves_at(likelihood, equation, point[None], x)
         if curve is None:
             return math.inf
         trials.append((point.copy(), curve, likelihood.fitted(curve, trials[-1][2].x if trials else x)))
@@ -597,7 +601,7 @@ def exchange_gain(result: Estimate, threshold: float) -> float:
 def thinned(film: Film) -> Film:
     """Return a film of about a hundred frames, evenly chosen, for first guesses."""
     subset = slice(None, None, max(1, len(film.t) // 80)) if film.quantity == "points" else slice(None)
-    return replace(film, t=film.t[subset], values=film.values[:, subset], lines=film.lines[subset])
+    return film.frames(subset)
 
 
 def exchanged(film: Film) -> Film:
@@ -702,7 +706,7 @@ def _initial_rate(t: FloatArray, angle: FloatArray, window: int) -> float:
 def fit_place(film: Film, curve: Curve, spin: FloatArray, end: float, length: float) -> tuple[FloatArray, float]:
     """Return all inner parameters for a given spin, a robust linear fit of the place up to ``end``, and the noise."""
     in_flight = (film.t >= spin[0] - 1e-9) & (film.t <= end + 1e-9)
-    flight = replace(film, t=film.t[in_flight], values=film.values[:, in_flight], lines=film.lines[in_flight])
+    flight = film.frames(in_flight)
     x = np.array([*spin, *[0.0] * 5, -9.81, length, 0.0, 0.0, 0.0, np.log(0.002), np.log(FIRST.size)])
     likelihood = Likelihood(flight, Held(), end, 0.002)
     values, slopes = likelihood.model(curve, x)

@@ -109,7 +109,7 @@ class Assessment:
     def fitted(self) -> tuple[FloatArray, FloatArray]:
         """theta and omega of the fitted flight at the film's frames, in the picture, each (P,)."""
         estimate, x = self.estimate, self.estimate.fit.x
-        tilt = math.atan2(x[7], -x[8]) if estimate.likelihood.planar else 0.0
+        tilt = estimate.likelihood.tilt(x)
         turned, rate, *_ = estimate.curve.at(abs(x[2]) * (estimate.film.t - x[0]), float(x[2]), float(x[1]) - tilt)
         return x[1] + np.sign(x[2]) * turned, x[2] * rate
 
@@ -188,9 +188,8 @@ class Assessment:
     def held(self) -> dict[str, tuple[float, str]]:
         """What is held: the parameter, its value [as of ``UNITS``] and what holds it."""
         held, release = self.estimate.held, self.estimate.likelihood.held.release
-        given = held.release is not None and held.release != self.estimate.film.release
         values: dict[str, tuple[float | None, str]] = {
-            "release": (release, "--release" if given else "the release of the table"),
+            "release": (release, "--release" if held.release is not None else "the release of the table"),
             "theta0": (held.theta0 if self.estimate.curve.slopes is not None else None, "theta0 of the scenario"),
             "touch": (held.touch, "--landing"),
             "noise": (held.noise, "--noise"),
@@ -589,11 +588,11 @@ def ranked(assessments: Sequence[Assessment]) -> list[Assessment]:
 def compared(assessments: Sequence[Assessment]) -> str:
     """Return which equation the film favours, in words."""
     best, *others = ranked(assessments)
-    equivalent = [fit.estimate.solver for fit in others if best.estimate.evidence - fit.estimate.evidence <= INDISTINCT]
+    equivalent = [fit.estimate.solver for fit in others if fit.log_deficit <= INDISTINCT]
     worse = [
-        f"{fit.estimate.solver} by a factor of exp({best.estimate.evidence - fit.estimate.evidence:.0f})"
+        f"{fit.estimate.solver} by a factor of exp({fit.log_deficit:.0f})"
         for fit in others
-        if best.estimate.evidence - fit.estimate.evidence > INDISTINCT
+        if fit.log_deficit > INDISTINCT
     ]
     sentences = [f"{best.estimate.solver}: {best.conclusion}."]
     if equivalent:

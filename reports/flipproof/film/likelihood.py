@@ -18,7 +18,7 @@ alone has rows of one coordinate, no hand and no table.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -82,7 +82,6 @@ class Film:
     quantity : what ``values`` are
     lines : (P,) - lines of the file, 0 where a frame has none
     notes : how the file was read
-    release : float or None - [s], if the file states it
     """
 
     label: str
@@ -91,7 +90,6 @@ class Film:
     quantity: Quantity
     lines: NDArray[np.int64]
     notes: tuple[str, ...] = ()
-    release: float | None = None
 
     def names(self, count: int) -> tuple[str, ...]:
         """Return the names of the inner parameters, with ``count`` motions of a hand."""
@@ -111,6 +109,10 @@ class Film:
         values = self.values.reshape(-1, self.values.shape[2])
         span = np.nanmax(values, axis=0) - np.nanmin(values, axis=0)
         return float(np.prod(np.maximum(span, 1e-3 * max(1e-6, float(span.max())))))
+
+    def frames(self, chosen: NDArray[np.bool_] | slice) -> Film:
+        """Return the film of some of its frames."""
+        return replace(self, t=self.t[chosen], values=self.values[:, chosen], lines=self.lines[chosen])
 
     def scatter(self, frames: NDArray[np.bool_] | slice = slice(None)) -> float:
         """Return the noise of a click from the scatter of the bottle's clicked length, without an equation [m]."""
@@ -245,13 +247,16 @@ class Likelihood:
 
     # ------------------------------------------------------------------ the model
 
+    def tilt(self, x: FloatArray) -> float:
+        """Return the angle of gravity from the picture's vertical [rad]; 0 of a table, which has no picture."""
+        return float(np.arctan2(x[self.index["ax"]], -x[self.index["ay"]])) if self.planar else 0.0
+
     def model(self, curve: Curve, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the predicted values, (B, P, D), and their slopes by the inner parameters, (B, P, D, K)."""
         film, n = self.film, self.index
         theta0, omega0 = x[1], x[2]
         tau = film.t - x[0]
-        tilt = np.arctan2(x[n["ax"]], -x[n["ay"]]) if self.planar else 0.0
-        turning = curve.at(abs(omega0) * tau, omega0, theta0 - tilt)
+        turning = curve.at(abs(omega0) * tau, omega0, theta0 - self.tilt(x))
         if self.planar:
             values, slopes = points(turning, film.t, x, self.hands, KNOT_SPACING)
             return values, slopes
@@ -284,7 +289,12 @@ class Likelihood:
         """Return the cost of every value (B, P), the probability that it is no bad click, and its residual."""
         values, _ = self.model(curve, x)
         variance, _ = self.variance(x)
-        return self._density(self.film.values - values, variance)
+        residuals = np.where(self.observed[:, :, None], self.film.values - values, 0.0)
+        power = residuals.shape[2] / 2
+        half_chi2 = (residuals**2).sum(axis=2) / (2 * variance)
+        good = np.log1p(-BAD) - half_chi2 - power * np.log(2 * np.pi * variance)
+        total = np.logaddexp(good, self.log_bad)
+        return np.where(self.observed, -total, 0.0), np.where(self.observed, np.exp(good - total), 0.0), residuals
 
     def costs_of_touches(self, curve: Curve, x: FloatArray, times: FloatArray, table: Table) -> FloatArray:
         """Return the cost of all clicks if the touch had been at each of some times, shape (len(times),)."""
@@ -295,14 +305,6 @@ class Likelihood:
         return np.asarray(
             touch_costs(squares, self.observed, variance, t, times, *table, bound, np.log1p(-BAD), self.log_bad)
         )
-
-    def _density(self, residuals: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        residuals = np.where(self.observed[:, :, None], residuals, 0.0)
-        power = residuals.shape[2] / 2
-        half_chi2 = (residuals**2).sum(axis=2) / (2 * variance)
-        good = np.log1p(-BAD) - half_chi2 - power * np.log(2 * np.pi * variance)
-        total = np.logaddexp(good, self.log_bad)
-        return np.where(self.observed, -total, 0.0), np.where(self.observed, np.exp(good - total), 0.0), residuals
 
     def terms(self, curve: Curve, x: FloatArray, kind: int = 0) -> tuple[float, FloatArray, FloatArray]:
         """Return the cost for a kind of hand, its gradient and Fisher's information."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from flipproof.film.clip import read_table
 from flipproof.film.estimate import estimate
 from flipproof.film.judge import Assessment, compared, ranked
 from flipproof.film.likelihood import Film
@@ -69,14 +68,9 @@ class Measured:
         )
 
 
-def read_measured(path: Path) -> Film:
-    """Read a track of ``flipproof track``, or any CSV with t and theta or omega; refuse as ``clip.read_table``."""
-    return read_table(path)
-
-
-def hold(film: Film, scenario: Scenario, tick: Callable[[int], object] = lambda _: None) -> Measured:
+def hold(film: Film, scenario: Scenario) -> Measured:
     """Return a film fitted by the solvers of ``HELD``; refused if the best estimate is unsound."""
-    fits = ranked([Assessment(estimate(film, scenario, name, tick=tick)) for name in HELD])
+    fits = ranked([Assessment(estimate(film, scenario, name)) for name in HELD])
     fits[0].check()
     return Measured(film=film, fits=tuple(fits))
 

@@ -151,7 +151,6 @@ def write(assessments: Sequence[Assessment], text: str, folder: Path, provenance
         write_text(folder / f"{name}.svg", drawing.svg)
         (folder / f"{name}.png").write_bytes(drawing.png)
     write_text(folder / "track.csv", track_csv(assessments[0]))
-    write_text(folder / "fit.txt", text + "\n")
     numbers = summary(assessments, provenance)
     write_text(folder / "summary.json", json.dumps(numbers, indent=1, allow_nan=False) + "\n")
     page = environment().get_template("track.html.j2")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -93,18 +94,13 @@ def read_curve(path: Path) -> Curve:
 def _series(path: Path, names: list[str], rows: Rows, name: str) -> tuple[FloatArray, FloatArray]:
     """Return times and values of the rows in which both cells are filled."""
     places = names.index("t"), names.index(name)
-    samples = np.array(
-        [
-            (number_of(path, line, "t", cells[places[0]]), number_of(path, line, name, cells[places[1]]), line)
-            for line, cells in rows
-            if all(cells[place].strip() for place in places)
-        ]
-    ).reshape(-1, 3)
-    back = np.flatnonzero(np.diff(samples[:, 0]) < 0)
+    filled = [(line, cells) for line, cells in rows if all(cells[place].strip() for place in places)]
+    t, values = numbers_in(path, names, filled, ("t", name)).T
+    back = np.flatnonzero(np.diff(t) < 0)
     if len(back):
-        before, after = samples[back[0], 0], samples[back[0] + 1, 0]
-        raise ValueError(f"{path}: line {samples[back[0] + 1, 2]:.0f}: t = {after:g} s follows t = {before:g} s")
-    return samples[:, 0], samples[:, 1]
+        k = int(back[0]) + 1
+        raise ValueError(f"{path}: line {filled[k][0]}: t = {t[k]:g} s follows t = {t[k - 1]:g} s")
+    return t, values
 
 
 def _flight_in(path: Path, names: list[str], rows: Rows) -> tuple[Rows, float]:
@@ -159,6 +155,16 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
 def _split(line: str) -> list[str]:
     """Return the cells of a line; a quoted one may hold commas, as names of Modelica do."""
     return next(csv.reader([line], skipinitialspace=True)) if '"' in line else line.split(",")
+
+
+def numbers_in(path: Path, names: Sequence[str], rows: Rows, wanted: Sequence[str]) -> FloatArray:
+    """Return some columns of a table, shape (rows, columns), NaN where a cell is empty; refuse as ``number_of``."""
+    places = [(name, names.index(name)) for name in wanted]
+    numbers = [
+        [number_of(path, line, name, cells[k]) if cells[k].strip() else np.nan for name, k in places]
+        for line, cells in rows
+    ]
+    return np.array(numbers, dtype=np.float64).reshape(-1, len(places))
 
 
 def number_of(path: Path, line: int, column: str, cell: str) -> float:

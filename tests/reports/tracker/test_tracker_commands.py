@@ -224,9 +224,3 @@ def test_arguments_that_are_no_numbers(arguments, capsys):
         run("export", "--solver", "exact-step", *arguments)
     assert exit_status.value.code == 2
     assert "is not" in capsys.readouterr().err
-
-
-def test_a_file_that_is_a_link(tmp_path):
-    shutil.copy(EXAMPLES / "tab.txt", tmp_path / "real.txt")
-    (tmp_path / "link.txt").symlink_to(tmp_path / "real.txt")
-    assert read_track_table(tmp_path / "link.txt").tracks.keys() == {"cap", "base"}

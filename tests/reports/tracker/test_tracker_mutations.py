@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tracker_files import written
 
 from flipproof.film.tracker.reader import read_track_table
 from flipproof.film.tracker.table import TrackFileError
@@ -282,7 +283,7 @@ def wrong_numbers(file, damage, table):
     return problems
 
 
-def judge(written, folder, seed):
+def judge(folder, seed):
     """Return "accepted" or "refused" for one damaged file; fail if it is neither rightly."""
     file, rng = written(seed)
     mutate = MUTATIONS[seed % len(MUTATIONS)]
@@ -302,14 +303,14 @@ def judge(written, folder, seed):
     return "accepted"
 
 
-def test_damaged_files_are_refused_or_read_right(written, tmp_path):
-    outcomes = [judge(written, tmp_path, seed) for seed in SEEDS]
+def test_damaged_files_are_refused_or_read_right(tmp_path):
+    outcomes = [judge(tmp_path, seed) for seed in SEEDS]
     # Both happen often, so that neither "refuse everything" nor "accept everything" passes.
     assert outcomes.count("accepted") >= 40
     assert outcomes.count("refused") >= 80
 
 
-def test_the_judge_sees_a_shifted_row(written, tmp_path):
+def test_the_judge_sees_a_shifted_row(tmp_path):
     """The check itself must be able to fail: a reader that drops an empty cell is caught."""
     file, _ = written(3, dialect=0, missing=0.0)
     path = tmp_path / "whole.txt"
@@ -322,7 +323,7 @@ def test_the_judge_sees_a_shifted_row(written, tmp_path):
 
 
 @pytest.mark.parametrize("lost", [0, 5, 11])
-def test_the_judge_misses_no_row(written, tmp_path, lost):
+def test_the_judge_misses_no_row(tmp_path, lost):
     file, _ = written(4, dialect=0, missing=0.0)
     path = tmp_path / "whole.txt"
     lines = file.lines()
@@ -331,7 +332,7 @@ def test_the_judge_misses_no_row(written, tmp_path, lost):
     assert wrong_numbers(file, Damage(b""), read_track_table(path)) == [f"rows [{lost}] are gone"]
 
 
-def test_noise_is_not_always_harmless(written, tmp_path):
+def test_noise_is_not_always_harmless(tmp_path):
     """Among the mutations of digits some are accepted with another number in the touched cell, and only there."""
     changed = 0
     for seed in range(300):

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 
 
 @dataclass(frozen=True)
@@ -16,6 +15,7 @@ class Written:
     delimiter: str
     decimal: str
     newline: str = "\n"
+    encoding: str = "utf-8"
 
     def truth(self, row, column):
         """Return the number that a printed cell stands for; NaN for an empty one."""
@@ -27,6 +27,9 @@ class Written:
 
     def text(self):
         return self.newline.join(self.lines()) + self.newline
+
+    def content(self):
+        return self.text().encode(self.encoding)
 
     def spans(self):
         """Yield (line, column, first, end) of every cell of the text; line counts from 0 over head and data."""
@@ -47,8 +50,19 @@ def printed(value, digits, decimal, scientific):
 
 
 def make_written(rng, *, delimiter, decimal, rows=12, tracks=("cap", "base"), columns=("x", "y"), missing=0.1,
-                 multi=True, closing=True, data_closing=False, newline="\n", digits=4):  # fmt: skip
-    """Return a file with random numbers, all different from each other."""
+                 multi="#multi:", closing=True, data_closing=False, newline="\n", digits=4, encoding="utf-8",
+                 subscripts=False, underscores=False, comment=""):  # fmt: skip
+    """Return a file with random numbers, all different from each other.
+
+    Parameters
+    ----------
+    multi : the first line of an export of several tracks, "" for none
+    closing, data_closing : whether the rows of names, and those of numbers, end with a delimiter
+    digits : behind the decimal sign
+    subscripts : whether titles are the older ``v_{x}``, else ``vx``
+    underscores : whether names hold underscores for spaces, as a copied table does
+    comment : a line above the table
+    """
     width = 1 + len(tracks) * len(columns)
     cells = []
     for k in range(rows):
@@ -61,12 +75,12 @@ def make_written(rng, *, delimiter, decimal, rows=12, tracks=("cap", "base"), co
         cells.append([*row, ""] if data_closing else row)
     names, titles = [""], ["t"]
     for name in tracks:
-        names += [name] + [""] * (len(columns) - 1)
-        titles += list(columns)
+        names += [name.replace(" ", "_") if underscores else name] + [""] * (len(columns) - 1)
+        titles += [f"{c[0]}_{{{c[1:]}}}" if subscripts and len(c) > 1 else c for c in columns]
     end = [""] if closing else []
-    head = ([["#multi:"]] if multi else []) + [names + end, titles + end]
+    head = [[line] for line in (comment, multi) if line] + [names + end, titles + end]
     headings = [(name, column) for name in tracks for column in columns]
-    return Written(head=head, cells=cells, headings=headings, delimiter=delimiter, decimal=decimal, newline=newline)
+    return Written(head, cells, headings, delimiter, decimal, newline, encoding)
 
 
 DIALECTS = [
@@ -77,22 +91,32 @@ DIALECTS = [
     dict(delimiter=",", decimal="."),
     dict(delimiter=" ", decimal="."),
     dict(delimiter=" ", decimal=","),
-    dict(delimiter="\t", decimal=".", multi=False, closing=False),
+    dict(delimiter="\t", decimal=".", multi="", closing=False),
     dict(delimiter=",", decimal=".", data_closing=True),
     dict(delimiter="\t", decimal=".", columns=("x", "y", "vx")),
     dict(delimiter=";", decimal=",", tracks=("cap", "base", "ice"), data_closing=True),
-    dict(delimiter="\t", decimal=".", tracks=("cap",), multi=False),
+    dict(delimiter="\t", decimal=".", tracks=("cap",), multi=""),
 ]
 
 
-@pytest.fixture
-def written():
-    """Return the maker of a file in one of several dialects."""
+STYLES = [
+    *DIALECTS,
+    dict(delimiter="\t", decimal=".", digits=17),
+    dict(delimiter=",", decimal=".", comment="// synthetic"),
+    dict(delimiter=" ", decimal=".", tracks=("cap", "base mark"), underscores=True),
+    dict(delimiter="\t", decimal=",", newline="\r\n", encoding="utf-8-sig"),
+    dict(delimiter="\t", decimal=".", encoding="utf-16"),
+    dict(delimiter="\t", decimal=".", multi="multi:", columns=("x", "y", "vx"), subscripts=True),
+    dict(
+        delimiter="\t", decimal=".", multi="", closing=False, tracks=("cap", "base mark"), underscores=True,
+        comment="// synthetic",
+    ),
+]  # fmt: skip
+"""Every way of writing; files in ``DIALECTS`` are damaged, too."""
 
-    def make(seed, dialect=None, **changes):
-        rng = np.random.default_rng(seed)
-        chosen = DIALECTS[int(rng.integers(len(DIALECTS))) if dialect is None else dialect]
-        return make_written(rng, **{**chosen, **changes}), rng
 
-    make.dialects = range(len(DIALECTS))
-    return make
+def written(seed, dialect=None, **changes):
+    """Return a file in one of several dialects, and the generator that drew it."""
+    rng = np.random.default_rng(seed)
+    chosen = DIALECTS[int(rng.integers(len(DIALECTS))) if dialect is None else dialect]
+    return make_written(rng, **{**chosen, **changes}), rng
