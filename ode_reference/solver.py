@@ -1,4 +1,4 @@
-"""The verb of this room: one scenario and one equation of motion in, one trajectory out; or many, and a batch."""
+"""The verb of this room: one scenario and one equation of motion in, one trajectory out; or many at a time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,9 +19,6 @@ from ode_reference.motion import Model
 from ode_reference.switches import Switches, are_switches
 from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other, true_or_false
 from slicemodel.trajectory import Trajectory, check_states, output_times, times_given
-
-if TYPE_CHECKING:
-    from ode_reference.flow.api import Batch
 
 COLUMN: Final = "column"
 RODS: Final = "rods"
@@ -233,7 +230,7 @@ def solve_batch(
     twin: int = 0,
     states: bool = False,
     jobs: int | None = None,
-) -> Batch:
+) -> tuple[Trajectory, ...]:
     """Solve one equation for many throws by "taylor", on all cores; each equals its single run to the last digit.
 
     Parameters
@@ -247,9 +244,8 @@ def solve_batch(
 
     Returns
     -------
-    Batch
-        Arrays ``t``, ``theta``, ``omega`` of shape (K, P), ``status`` of K names; ``batch[k]`` is the Trajectory of
-        throw k, with its impacts.
+    tuple of K Trajectory
+        In the order of the throws.
 
     Raises
     ------
