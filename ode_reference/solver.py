@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import number_within, velocities_of
+from ode_reference.arguments import number_above, number_within, velocities_of
 from ode_reference.combinations import is_ours, model_of, require_own_switches
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
@@ -24,9 +24,13 @@ COLUMN: Final = "column"
 RODS: Final = "rods"
 """The names of two models of all the water at once."""
 
+WATER_RTOL: Final = 1e-12
+WATER_ATOL: Final = 1e-14
+"""Default tolerances of these two."""
+
 
 class Water(NamedTuple):
-    """A model of all the water at once, solved by ``ode_reference.NAME``; equation and reason as of other models."""
+    """A model of all the water at once, flown by ``ode_reference.NAME``; equation and reason as of other models."""
 
     equation: str
     reason: str
@@ -104,10 +108,10 @@ def solve(
         choose. Or a method of ``scipy.integrate.solve_ivp`` over all 2N + 1 equations (``ode_reference.witness``): a
         name in ``ode_reference.METHODS``.
     rtol, atol, max_step : float, optional
-        Of those other methods only: relative tolerance of a step, in [1e-13, 1e-2], 1e-10 by default; absolute
-        tolerance, in (0, 1e-2], 1e-13 by default, one number for [rad], [m] and [m/s]; longest step, at least
-        duration / 1e6 [s], by default 1 / |omega0|, within duration / 1e5 and duration, which binds only at rtol above
-        1e-5: no slice has the time to turn twice within a quarter of a step.
+        Of those other methods only: relative tolerance of a step, in [1e-13, 1e-2], 1e-10 by default (1e-12 of "column"
+        and "rods"); absolute tolerance, in (0, 1e-2], 1e-13 by default (1e-14), one number for [rad], [m] and [m/s];
+        longest step, at least duration / 1e6 [s], by default 1 / |omega0|, within duration / 1e5 and duration, which
+        binds only at rtol above 1e-5: no slice has the time to turn twice within a quarter of a step.
     rest_speed : float, optional
         Speed below which a slice that an end pushes back stays there, in [1e-8, 0.1] [m/s]. By default 1e-5, and with
         recoil ``usual_rest_speed``, 1e-3 in the paper's throw: there the tube shakes resting slices off at every
@@ -177,8 +181,11 @@ def solve(
         )  # fmt: skip
         return replace(run, scenario=scenario, settings={**run.settings, "own_inertia": True})
     if isinstance(model, str) and model in WATERS:
-        run = import_module(f"ode_reference.{model}").solve(scenario, rtol, atol, times)
-        return cast(Trajectory, run)
+        rtol = number_within("rtol", WATER_RTOL if rtol is None else rtol, 1e-13, 1e-2)
+        atol = number_above("atol", WATER_ATOL if atol is None else atol, 0.0, 1e-2)
+        t_out = output_times(scenario, times)
+        check_states(scenario.n_slices, len(t_out), "cut it coarser, or ask for fewer times")
+        return cast(Trajectory, import_module(f"ode_reference.{model}").fly(scenario, t_out, rtol, atol))
     chosen = model_named(model)
     known_name("method", method, (TAYLOR, *INTEGRATORS))
     speed, twin = _rest_speed(rest_speed, chosen, scenario), _twin(twin)
