@@ -19,7 +19,7 @@ import pymunk
 from engine_check import pymunk_rods as rods
 from engine_check import pymunk_settings as fixed
 from engine_check import watch
-from engine_check.engines import Order
+from engine_check.engines import Order, knobs_from
 from engine_check.pymunk_settings import PymunkKnobs, enough_iterations, restitution_between_slices
 from engine_check.pymunk_setup import verify
 from engine_check.pymunk_world import BatchReader, World, build, start_staggered
@@ -55,7 +55,7 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     Output intervals that need unequal steps cost one order: a leapfrog whose step changes from h to h' has
     kicked its velocities for (h - h')/2 too long.
     """
-    settings = PymunkKnobs.from_overrides(order.knobs)
+    settings = knobs_from(PymunkKnobs, order.knobs)
     iterations = enough_iterations(scenario) if order.iterations is None else order.iterations
     ice, dt, times = order.ice, order.dt, order.times
     world = build(scenario, settings, iterations, ice, order.slices)

@@ -16,12 +16,12 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Final
 
 from engine_check.engines import MAX_ITERATIONS
-from slicemodel.scenario import Scenario, _Checks, unknown_name
+from slicemodel.scenario import Scenario, _Checks
 
 CAP_ELASTICITY: Final = 1.0
 """The engine multiplies the elasticities of the two partners [1] (default 0): slices carry e, so caps carry 1."""
@@ -167,15 +167,6 @@ class PymunkKnobs:
         checks.whole("shuffle", self.shuffle, minimum=0, maximum=1_000_000)
         checks.number("grid_offset", self.grid_offset, "", minimum=0.0, maximum=0.5)
         checks.refuse()
-
-    @classmethod
-    def from_overrides(cls, overrides: Mapping[str, float]) -> PymunkKnobs:
-        """Return the defaults with some knobs changed; an unknown name raises ValueError with the nearest."""
-        names = [f.name for f in fields(cls)]
-        for name in overrides:
-            if name not in names:
-                raise ValueError(unknown_name("knob =", name, names))
-        return cls(**overrides)  # type: ignore[arg-type]
 
     def to_mapping(self) -> dict[str, float | None]:
         """Return all knobs by name."""

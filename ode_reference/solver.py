@@ -12,13 +12,12 @@ from typing import Any, Final, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import number_above, number_within, velocities_of
 from ode_reference.combinations import is_ours, model_of, require_own_switches
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import Switches, are_switches
-from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other, true_or_false
-from slicemodel.trajectory import Trajectory, check_states, output_times, times_given
+from slicemodel.scenario import Scenario, known_name, not_whole, number_in, refuse_other, true_or_false
+from slicemodel.trajectory import FloatArray, Trajectory, check_states, output_times, times_given
 
 COLUMN: Final = "column"
 RODS: Final = "rods"
@@ -181,8 +180,8 @@ def solve(
         )  # fmt: skip
         return replace(run, scenario=scenario, settings={**run.settings, "own_inertia": True})
     if isinstance(model, str) and model in WATERS:
-        rtol = number_within("rtol", WATER_RTOL if rtol is None else rtol, 1e-13, 1e-2)
-        atol = number_above("atol", WATER_ATOL if atol is None else atol, 0.0, 1e-2)
+        rtol = number_in("rtol", WATER_RTOL if rtol is None else rtol, 1e-13, 1e-2)
+        atol = number_in("atol", WATER_ATOL if atol is None else atol, 0.0, 1e-2, open_low=True)
         t_out = output_times(scenario, times)
         check_states(scenario.n_slices, len(t_out), "cut it coarser, or ask for fewer times")
         return cast(Trajectory, import_module(f"ode_reference.{model}").fly(scenario, t_out, rtol, atol))
@@ -212,8 +211,21 @@ def solve(
     settings = _settings(chosen, speed, energy, twin)
     if speeds is None:
         return api.fly(scenario, t_out, chosen.switches, settings)
-    velocities = velocities_of(scenario, speeds)
+    velocities = _velocities_of(scenario, speeds)
     return api.fly(scenario, t_out, chosen.switches, settings | {"speeds": velocities.tolist()}, speeds=velocities)
+
+
+def _velocities_of(scenario: Scenario, speeds: ArrayLike) -> FloatArray:
+    """Return ``speeds`` as an array if they are N finite numbers, of slices that can move; else raise ValueError."""
+    try:
+        velocities = np.asarray(speeds, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"speeds = {speeds!r} are no numbers") from None
+    if velocities.shape != (scenario.n_slices,) or not np.isfinite(velocities).all():
+        raise ValueError(f"speeds = {speeds!r} are not {scenario.n_slices} finite numbers [m/s]")
+    if scenario.frozen and velocities.any():
+        raise ValueError(f"speeds = {speeds!r} m/s of frozen water: it does not move")
+    return velocities
 
 
 def with_own_inertia(scenario: Scenario) -> Scenario:
@@ -309,7 +321,7 @@ def _rest_speed(given: float | None, model: Model, scenario: Scenario) -> float:
     """Return the rest speed of a run [m/s]."""
     if given is None:
         return usual_rest_speed(model.switches, scenario)
-    return number_within("rest_speed", given, MIN_REST_SPEED, 0.1, unit=" m/s")
+    return number_in("rest_speed", given, MIN_REST_SPEED, 0.1, " m/s")
 
 
 def _twin(number: int) -> int:
