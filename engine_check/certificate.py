@@ -18,10 +18,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from engine_check.engines import ENGINES, check_asked, checked_number
+from engine_check.engines import ENGINES, check_asked
 from engine_check.refinement import BENT, DOUBLE, EARLIER, MOVED, SHAKEN, Level, Runs, Trial, search
 from engine_check.restitution import Rebound, measure_restitution
-from slicemodel.scenario import Scenario, not_whole
+from slicemodel.scenario import Scenario, not_whole, number_in
 from slicemodel.trajectory import FloatArray, Trajectory, output_times
 
 DEFAULT_TOLERANCE: Final = 2e-3
@@ -212,7 +212,7 @@ def certify(
     more, against event-driven free flight; of all output times 99.3 %.
     """
     check_asked(scenario, engine, ice, slices)
-    tolerance = checked_number("tolerance", tolerance, 0.0, 1.0)
+    tolerance = number_in("tolerance", tolerance, 0.0, 1.0, open_low=True, open_high=True)
     problem = not_whole("levels", levels, 1, MAX_LEVELS)
     if problem:
         raise ValueError(problem)

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine_check import watch
-from engine_check.engines import Order
+from engine_check.engines import Order, knobs_from
 from engine_check.mujoco_settings import DISABLED, MujocoKnobs
 from engine_check.watch import Bound, State
 from slicemodel.scenario import Scenario
@@ -89,7 +89,7 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     e < 1 and N = 50 omega differs from ``free-flight`` by 3e-5 to 7e-4 omega_0 at dt from 4e-4 to 2e-5 s, without
     order; ``free-flight`` itself moves as far with its rest speed.
     """
-    settings = MujocoKnobs.from_overrides(order.knobs)
+    settings = knobs_from(MujocoKnobs, order.knobs)
     if order.iterations is not None:
         raise ValueError(
             f"iterations = {order.iterations!r} has no meaning for engine = 'mujoco' (its impulses are exact); "

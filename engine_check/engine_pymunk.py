@@ -17,14 +17,10 @@ import numpy as np
 import pymunk
 
 from engine_check import pymunk_rods as rods
+from engine_check import pymunk_settings as fixed
 from engine_check import watch
-from engine_check.engines import Order
-from engine_check.pymunk_settings import (
-    CAP_ELASTICITY,
-    PymunkKnobs,
-    enough_iterations,
-    restitution_between_slices,
-)
+from engine_check.engines import Order, knobs_from
+from engine_check.pymunk_settings import PymunkKnobs, enough_iterations, restitution_between_slices
 from engine_check.pymunk_setup import verify
 from engine_check.pymunk_world import BatchReader, World, build, start_staggered
 from engine_check.watch import State
@@ -59,7 +55,7 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
     Output intervals that need unequal steps cost one order: a leapfrog whose step changes from h to h' has
     kicked its velocities for (h - h')/2 too long.
     """
-    settings = PymunkKnobs.from_overrides(order.knobs)
+    settings = knobs_from(PymunkKnobs, order.knobs)
     iterations = enough_iterations(scenario) if order.iterations is None else order.iterations
     ice, dt, times = order.ice, order.dt, order.times
     world = build(scenario, settings, iterations, ice, order.slices)
@@ -83,9 +79,9 @@ def run(scenario: Scenario, order: Order) -> Trajectory:
             "slices": order.slices,
             "hits": None if scenario.frozen else "grid",
             "points": len(times),
+            **fixed.FIXED,
             **settings.to_mapping(),
             "slice_restitution": restitution_between_slices(scenario, settings, order.slices),
-            "cap_elasticity": CAP_ELASTICITY,
         },
         setup=setup,
     )
@@ -98,7 +94,7 @@ class _Flight:
         self, world: World, scenario: Scenario, knobs: PymunkKnobs, angular_momentum: float, exclude: bool
     ) -> None:
         self._world, self._scenario, self._exclude = world, scenario, exclude
-        self._cap_thickness, self._offset = knobs.cap_thickness, knobs.grid_offset
+        self._offset = knobs.grid_offset
         self._angular_momentum = angular_momentum
         self._reader = BatchReader(world)
         rows = self._reader.read()
@@ -180,7 +176,7 @@ class _Flight:
             bounds = (watch.BOUNDS, rods.BOUNDS) if self._exclude else (watch.BOUNDS,)
             left = (watch.first_left(residuals, limits)[0] for limits in bounds)
             self._reason = next(filter(None, left), "")
-            cause = watch.broken(residuals, self._cap_thickness)
+            cause = watch.broken(residuals, fixed.CAP_THICKNESS)
             return cause or (rods.broken(residuals, self._scenario) if self._exclude else "")
 
     def trajectory(self, *, method: str, settings: Mapping[str, Any], setup: Mapping[str, float]) -> Trajectory:

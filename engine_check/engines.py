@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import import_module
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from numpy.typing import ArrayLike
 
-from slicemodel.scenario import Scenario, known_name, refuse_other, unknown_name
+from slicemodel.scenario import Scenario, known_name, not_whole, number_in, refuse_other, unknown_name
 from slicemodel.trajectory import FloatArray, Trajectory, output_times
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Knobs = TypeVar("Knobs", bound="DataclassInstance")
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,29 +176,24 @@ def run_engine(
     return trajectory
 
 
-def checked_number(name: str, value: object, above: float, below: float, unit: str = "") -> float:
-    """Return ``value`` as float if it is a number in (above, below); else raise ValueError with the range."""
-    admissible = f"({above:g}, {below:g}){unit}"
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise ValueError(f"{name} = {value!r} is not a number (admissible: {admissible})")
-    # Written as "not inside", because NaN passes every "outside" test.
-    if not above < float(value) < below:
-        raise ValueError(f"{name} = {float(value)!r}{unit} is outside {admissible}")
-    return float(value)
-
-
 def _checked_step(dt: object, end: float) -> float:
     """Return a step if a flight up to the time ``end`` has at most ``MAX_STEPS`` of it, else raise ValueError."""
     try:
-        return checked_number("dt", dt, end / MAX_STEPS, math.inf, " s")
+        return number_in("dt", dt, end / MAX_STEPS, math.inf, " s", open_low=True)
     except ValueError as error:
         raise ValueError(f"{error}: an engine makes at most {MAX_STEPS:g} steps, here of {end:g} s in all") from None
 
 
 def _checked_iterations(iterations: object) -> int | None:
-    if iterations is None:
-        return None
-    whole = isinstance(iterations, numbers.Integral) and not isinstance(iterations, bool)
-    if not whole or not 1 <= int(iterations) <= MAX_ITERATIONS:  # type: ignore[call-overload]
-        raise ValueError(f"iterations = {iterations!r} is not a whole number in [1, {MAX_ITERATIONS}]")
-    return int(iterations)  # type: ignore[call-overload, no-any-return]
+    if iterations is not None and (problem := not_whole("iterations", iterations, 1, MAX_ITERATIONS)):
+        raise ValueError(problem)
+    return iterations  # type: ignore[return-value]
+
+
+def knobs_from(kind: type[Knobs], overrides: Mapping[str, float]) -> Knobs:
+    """Return the defaults with some knobs changed; an unknown name raises ValueError with the nearest."""
+    names = [field.name for field in fields(kind)]
+    for name in overrides:
+        if name not in names:
+            raise ValueError(unknown_name("knob =", name, names))
+    return kind(**overrides)

@@ -29,14 +29,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_check.engines import MAX_STEPS, checked_number
+from engine_check.engines import MAX_STEPS
 from engine_check.mujoco_log import no_log
 from engine_check.mujoco_setup import verify
 from engine_check.mujoco_world import TUBE, TUBE_DOFS
 from engine_check.mujoco_world import build as release
 from engine_check.readback import differences, matched
 from slicemodel.compiled import compiled, kept_on_disk
-from slicemodel.scenario import Scenario, known_name, refuse_other
+from slicemodel.scenario import Scenario, known_name, number_in, refuse_other
 from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch
 from slicemodel.trajectory import FloatArray
 
@@ -137,7 +137,7 @@ def land(
         raise ValueError(f"law = {law!r} has no meaning for ice (scenario.frozen): leave it out")
     rigid = immovable(touch.scenario)
     default = ICE_STEP if rigid else STEP
-    step = default if dt is None else checked_number("dt", dt, LONGEST_LANDING / MAX_STEPS, 1e-3 * (1 + 1e-12), " s")
+    step = default if dt is None else number_in("dt", dt, LONGEST_LANDING / MAX_STEPS, 1e-3, " s", open_low=True)
     if not rigid:
         step = _following(touch.scenario, step)
 

@@ -43,12 +43,10 @@ There is no text file between us and the engine (``MjSpec``), so that every numb
 
 from __future__ import annotations
 
-import numbers
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Final
 
-from slicemodel.scenario import unknown_name
+from slicemodel.scenario import number_in
 
 DISABLED: Final = ("CONSTRAINT", "LIMIT", "CONTACT", "ISLAND", "EULERDAMP", "AUTORESET", "ACTUATION", "SENSOR")
 """The parts of the engine that are switched off (``mjDSBL_...``), for the reasons above."""
@@ -77,18 +75,7 @@ class MujocoKnobs:
     rest_flight: float = 1.0
 
     def __post_init__(self) -> None:
-        # Written as "not inside", because NaN passes every "outside" test.
-        if not isinstance(self.rest_flight, numbers.Real) or not 0.0 < self.rest_flight <= MAX_FLIGHT:
-            raise ValueError(f"rest_flight = {self.rest_flight!r} is outside (0, {MAX_FLIGHT:g}]")
-
-    @classmethod
-    def from_overrides(cls, overrides: Mapping[str, float]) -> MujocoKnobs:
-        """Return the defaults with some knobs changed; an unknown name raises ValueError with the nearest."""
-        names = [f.name for f in fields(cls)]
-        for name in overrides:
-            if name not in names:
-                raise ValueError(unknown_name("knob =", name, names))
-        return cls(**overrides)
+        number_in("rest_flight", self.rest_flight, 0.0, MAX_FLIGHT, open_low=True)
 
     def to_mapping(self) -> dict[str, float]:
         """Return all knobs by name."""

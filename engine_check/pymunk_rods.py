@@ -28,6 +28,7 @@ from typing import Final
 import numpy as np
 import pymunk
 
+from engine_check.pymunk_settings import FRICTION
 from engine_check.watch import Bound, State, first_left
 from slicemodel.scenario import Scenario
 
@@ -59,17 +60,17 @@ def meets_walls_only(shape: pymunk.Shape, group: int = 0) -> None:
     shape.filter = pymunk.ShapeFilter(group=group, categories=WALLS, mask=WALLS)
 
 
-def neighbour_shape(body: pymunk.Body, index: int, radius: float, restitution: float, friction: float) -> pymunk.Shape:
+def neighbour_shape(body: pymunk.Body, index: int, radius: float, restitution: float) -> pymunk.Shape:
     """Return the shape by which slice ``index``, counted from the base, meets the slices before and after it."""
     category, mask = (EVEN, ODD) if index % 2 == 0 else (ODD, EVEN)
     circle = pymunk.Circle(body, radius)
     circle.elasticity = restitution if category == EVEN else 1.0
-    circle.friction = friction
+    circle.friction = FRICTION
     circle.filter = pymunk.ShapeFilter(categories=category, mask=mask)
     return circle
 
 
-def intended(scenario: Scenario, restitution: float, friction: float) -> dict[str, float]:
+def intended(scenario: Scenario, restitution: float) -> dict[str, float]:
     """Return what the neighbour shapes must hold, from the scenario alone, under the names of ``read_back``."""
     pairs = scenario.n_slices - 1
     meant = {
@@ -79,7 +80,7 @@ def intended(scenario: Scenario, restitution: float, friction: float) -> dict[st
         "second_neighbours_that_collide": 0.0,
     }
     if pairs:
-        touching = {"contacts": 1.0, "elasticity": restitution, "friction": friction**2, "off_centre": 0.0}
+        touching = {"contacts": 1.0, "elasticity": restitution, "friction": FRICTION**2, "off_centre": 0.0}
         touching["distance"] = scenario.slice_height
         for name, value in touching.items():
             meant |= {f"neighbour_{name}.least": value, f"neighbour_{name}.most": value}

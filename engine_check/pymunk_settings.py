@@ -1,4 +1,4 @@
-"""Every knob of the pymunk world: value, unit and reason, in one place.
+"""Every setting of the pymunk world: value, unit and reason, in one place; and the knobs that a study turns.
 
 pymunk's defaults are made for games in pixels; none is left to stand. How Chipmunk steps explains most
 reasons below. ``space.step(dt)`` does, in this order::
@@ -16,14 +16,60 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
+from types import MappingProxyType
 from typing import Final
 
 from engine_check.engines import MAX_ITERATIONS
-from slicemodel.scenario import MAX_VALUE, Scenario, _Checks, unknown_name
+from slicemodel.scenario import Scenario, _Checks
 
 CAP_ELASTICITY: Final = 1.0
 """The engine multiplies the elasticities of the two partners [1] (default 0): slices carry e, so caps carry 1."""
+
+COLLISION_BIAS: Final = 1.0
+"""Share of a penetration that is left after one second [1] (default 0.0018): none is pushed back. Pushing back moves
+bodies without changing their velocities, which breaks angular momentum (by 5e-4 at full correction in the default
+throw, 1e-13 at 1)."""
+
+COLLISION_SLOP: Final = 0.0
+"""Penetration that is left alone [m]; the default 0.1 would be a third of the bottle."""
+
+COLLISION_PERSISTENCE: Final = 1
+"""Steps for which a contact's impulse is kept after separation (default 3). A slice that comes back must not start from
+the impulse of its last impact (omega differs by up to 3e-3 rad/s in 0.5 s); 1 forgets at once, 0 would forget contacts
+in use."""
+
+DAMPING: Final = 1.0
+"""Share of every velocity that is left after one second [1]: space itself brakes nothing."""
+
+FRICTION: Final = 0.0
+"""Friction of caps and slices [1]; contacts act along the axis only."""
+
+CAP_THICKNESS: Final = 0.5
+"""Thickness of the end caps beyond the inner face [L]. There is no swept test: a slice must not cross the cap within
+one step (5 m/s at 1e-4 s is 5e-4 m, the cap 0.14 m)."""
+
+GROOVE_REACH: Final = 1.0
+"""Ends of the groove from the tube's centre [L], above 0.5. They are dead stops, so they lie outside the tube."""
+
+ANCHOR_DISTANCE: Final = 10.0
+"""Anchor of the drag damper from the tube's centre along the axis [L], above 0.5: on one side of all slices, so that
+the damper's direction is the axis; no farther, because digits are lost to distance."""
+
+FIXED: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "collision_bias": COLLISION_BIAS,
+        "collision_slop": COLLISION_SLOP,
+        "collision_persistence": COLLISION_PERSISTENCE,
+        "damping": DAMPING,
+        "friction": FRICTION,
+        "cap_thickness": CAP_THICKNESS,
+        "groove_reach": GROOVE_REACH,
+        "anchor_distance": ANCHOR_DISTANCE,
+        "cap_elasticity": CAP_ELASTICITY,
+    }
+)
+"""What nobody turns, as a run states it among its settings."""
 
 MIN_ITERATIONS: Final = 50
 ITERATIONS_MARGIN: Final = 1.0
@@ -85,36 +131,14 @@ def insertion_order(n_slices: int, shuffle: float) -> list[int]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PymunkKnobs:
-    """The settings of the pymunk world apart from ``dt`` and ``iterations``.
+    """What a study of the pymunk world can turn, apart from ``dt`` and ``iterations``.
 
     Parameters
     ----------
-    collision_bias : float
-        Share of a penetration that is left after one second [1], in [0, 1]; pymunk's default 0.0018.
-        1: penetration is never pushed back. Pushing back moves bodies without changing their velocities,
-        which breaks angular momentum (by 5e-4 at full correction in the default throw, 1e-13 at 1).
-    collision_slop : float
-        Penetration that is left alone [m]; pymunk's default 0.1 would be a third of the bottle.
-    collision_persistence : int
-        Steps for which a contact's impulse is kept after separation; pymunk's default 3. A slice that comes
-        back must not start from the impulse of its last impact (omega differs by up to 3e-3 rad/s in 0.5 s);
-        1 forgets at once, 0 would forget contacts in use.
     error_bias : float
         Share of a joint's position error that is left after one second [1], in [0, 1]; pymunk's default 0.0018.
         0 removes it within one step. The correction acts on real velocities, so it supplies the half of the
         Coriolis force that a velocity constraint at the start of the step lacks: theta becomes order 2.
-    damping : float
-        Share of every velocity that is left after one second [1]; 1: space itself brakes nothing.
-    friction : float
-        Friction of caps and slices [1]; contacts act along the axis only.
-    cap_thickness : float
-        Thickness of the end caps beyond the inner face [L]. There is no swept test: a slice must not cross
-        the cap within one step (5 m/s at 1e-4 s is 5e-4 m, the cap 0.14 m).
-    groove_reach : float
-        Ends of the groove from the tube's centre [L], above 0.5. They are dead stops, so they lie outside the tube.
-    anchor_distance : float
-        Anchor of the drag damper from the tube's centre along the axis [L], above 0.5: on one side of all
-        slices, so that the damper's direction is the axis; no farther, because digits are lost to distance.
     slice_restitution : float or None
         Restitution of two slices that meet [1], in [0, 1]; only where slices exclude each other. None: the
         scenario's, because the paper knows one number for what water keeps of its speed in a collision, and a
@@ -130,57 +154,20 @@ class PymunkKnobs:
         states there lie on the straight line that the engine takes over the step.
     """
 
-    collision_bias: float = 1.0
-    collision_slop: float = 0.0
-    collision_persistence: int = 1
     error_bias: float = 0.0
-    damping: float = 1.0
-    friction: float = 0.0
-    cap_thickness: float = 0.5
-    groove_reach: float = 1.0
-    anchor_distance: float = 10.0
     slice_restitution: float | None = None
     shuffle: int = 0
     grid_offset: float = 0.0
 
     def __post_init__(self) -> None:
         checks = _Checks()
-        for name, (minimum, maximum) in _RANGES.items():
-            value = getattr(self, name)
-            if name in _WHOLE:
-                checks.whole(name, value, minimum=int(minimum), maximum=int(maximum))
-            elif not (value is None and name in _MAY_BE_LEFT_OUT):
-                checks.number(name, value, "", minimum=minimum, maximum=maximum)
+        checks.number("error_bias", self.error_bias, "", minimum=0.0, maximum=1.0)
+        if self.slice_restitution is not None:
+            checks.number("slice_restitution", self.slice_restitution, "", minimum=0.0, maximum=1.0)
+        checks.whole("shuffle", self.shuffle, minimum=0, maximum=1_000_000)
+        checks.number("grid_offset", self.grid_offset, "", minimum=0.0, maximum=0.5)
         checks.refuse()
-
-    @classmethod
-    def from_overrides(cls, overrides: Mapping[str, float]) -> PymunkKnobs:
-        """Return the defaults with some knobs changed; an unknown name raises ValueError with the nearest."""
-        names = [f.name for f in fields(cls)]
-        for name in overrides:
-            if name not in names:
-                raise ValueError(unknown_name("knob =", name, names))
-        return cls(**overrides)  # type: ignore[arg-type]
 
     def to_mapping(self) -> dict[str, float | None]:
         """Return all knobs by name."""
         return asdict(self)
-
-
-_RANGES: Final[Mapping[str, tuple[float, float]]] = {
-    "collision_bias": (0.0, 1.0),
-    "collision_slop": (0.0, MAX_VALUE),
-    "collision_persistence": (1, 1_000_000),
-    "error_bias": (0.0, 1.0),
-    "damping": (0.0, 1.0),
-    "friction": (0.0, MAX_VALUE),
-    "cap_thickness": (0.0, MAX_VALUE),
-    "groove_reach": (0.0, MAX_VALUE),
-    "anchor_distance": (0.0, MAX_VALUE),
-    "slice_restitution": (0.0, 1.0),
-    "shuffle": (0, 1_000_000),
-    "grid_offset": (0.0, 0.5),
-}
-
-_WHOLE: Final = ("collision_persistence", "shuffle")
-_MAY_BE_LEFT_OUT: Final = ("slice_restitution",)

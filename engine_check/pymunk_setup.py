@@ -14,6 +14,7 @@ import numpy as np
 import pymunk
 
 from engine_check import pymunk_rods as rods
+from engine_check import pymunk_settings as fixed
 from engine_check.pymunk_settings import PymunkKnobs, restitution_between_slices
 from engine_check.pymunk_world import World
 from engine_check.readback import both, differences, extremes, matched
@@ -36,10 +37,10 @@ def intended(
         "iterations": float(iterations),
         "gravity_x": 0.0,
         "gravity_y": -scenario.gravity,
-        "damping": knobs.damping,
-        "collision_slop": knobs.collision_slop,
-        "collision_bias": knobs.collision_bias,
-        "collision_persistence": float(knobs.collision_persistence),
+        "damping": fixed.DAMPING,
+        "collision_slop": fixed.COLLISION_SLOP,
+        "collision_bias": fixed.COLLISION_BIAS,
+        "collision_persistence": float(fixed.COLLISION_PERSISTENCE),
         "sleep_time_threshold": math.inf,
         "bodies": 1.0 if one_body else 1.0 + scenario.n_slices,
         "total_mass": scenario.total_mass,
@@ -70,17 +71,17 @@ def intended(
         "wall_shapes": float(scenario.n_slices),
     }
     if between is not None:
-        meant |= rods.intended(scenario, between, knobs.friction)
+        meant |= rods.intended(scenario, between)
     meant |= both("elasticity_product", scenario.restitution)
-    meant |= both("friction_product", knobs.friction**2)
-    meant |= both("groove_top", knobs.groove_reach * bottle.length)
-    meant |= both("groove_bottom", -knobs.groove_reach * bottle.length)
+    meant |= both("friction_product", fixed.FRICTION**2)
+    meant |= both("groove_top", fixed.GROOVE_REACH * bottle.length)
+    meant |= both("groove_bottom", -fixed.GROOVE_REACH * bottle.length)
     meant |= both("groove_off_axis", 0.0)
     meant |= both("contact_at_cap", scenario.r_min) | both("contact_at_base", scenario.r_max)
-    meant |= both("cap_thickness", knobs.cap_thickness * bottle.length)
+    meant |= both("cap_thickness", fixed.CAP_THICKNESS * bottle.length)
     if drag_count:
         meant |= both("drag", scenario.drag) | both("drag_stiffness", 0.0)
-        meant |= both("drag_anchor", knobs.anchor_distance * bottle.length) | both("drag_off_axis", 0.0)
+        meant |= both("drag_anchor", fixed.ANCHOR_DISTANCE * bottle.length) | both("drag_off_axis", 0.0)
     return meant
 
 

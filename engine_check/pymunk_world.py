@@ -24,7 +24,8 @@ import pymunk
 import pymunk.batch
 
 from engine_check import pymunk_rods as rods
-from engine_check.pymunk_settings import CAP_ELASTICITY, PymunkKnobs, insertion_order, restitution_between_slices
+from engine_check import pymunk_settings as fixed
+from engine_check.pymunk_settings import PymunkKnobs, insertion_order, restitution_between_slices
 from slicemodel.scenario import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -59,10 +60,10 @@ def build(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str, sli
     space = pymunk.Space()
     space.iterations = iterations
     space.gravity = (0.0, -scenario.gravity)
-    space.damping = knobs.damping
-    space.collision_slop = knobs.collision_slop
-    space.collision_bias = knobs.collision_bias
-    space.collision_persistence = knobs.collision_persistence
+    space.damping = fixed.DAMPING
+    space.collision_slop = fixed.COLLISION_SLOP
+    space.collision_bias = fixed.COLLISION_BIAS
+    space.collision_persistence = fixed.COLLISION_PERSISTENCE
     # A sleeping body would stop moving; infinity switches sleeping off.
     space.sleep_time_threshold = math.inf
 
@@ -85,7 +86,7 @@ def build(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str, sli
     tube.angular_velocity = scenario.omega0
     space.add(tube)
     if not scenario.frozen:
-        space.add(*_caps(tube, scenario, knobs))
+        space.add(*_caps(tube, scenario))
     between = restitution_between_slices(scenario, knobs, slices)
     bodies = {}
     for index in insertion_order(scenario.n_slices, knobs.shuffle):
@@ -101,7 +102,7 @@ def build(scenario: Scenario, knobs: PymunkKnobs, iterations: int, ice: str, sli
         else:
             space.add(*_slide(tube, body, scenario, knobs))
             if between is not None:
-                space.add(rods.neighbour_shape(body, index, scenario.slice_height / 2, between, knobs.friction))
+                space.add(rods.neighbour_shape(body, index, scenario.slice_height / 2, between))
     masses = np.array([bottle.mass, *[scenario.slice_mass] * len(bodies)])
     in_order = tuple(bodies[index] for index in range(scenario.n_slices))
     return World(space, tube, in_order, bottle.length / 2, masses, tube_moment)
@@ -117,15 +118,15 @@ def _throw(body: pymunk.Body, scenario: Scenario, offset: float) -> None:
     body.angular_velocity = scenario.omega0
 
 
-def _caps(tube: pymunk.Body, scenario: Scenario, knobs: PymunkKnobs) -> list[pymunk.Shape]:
+def _caps(tube: pymunk.Body, scenario: Scenario) -> list[pymunk.Shape]:
     length, half_width = scenario.bottle.length, scenario.bottle.radius
-    radius = knobs.cap_thickness * length / 2
+    radius = fixed.CAP_THICKNESS * length / 2
     caps: list[pymunk.Shape] = []
     for side in (-1.0, 1.0):
         y = side * (length / 2 + radius)
         cap = pymunk.Segment(tube, (-half_width, y), (half_width, y), radius)
-        cap.elasticity = CAP_ELASTICITY
-        cap.friction = knobs.friction
+        cap.elasticity = fixed.CAP_ELASTICITY
+        cap.friction = fixed.FRICTION
         rods.meets_walls_only(cap)
         caps.append(cap)
     return caps
@@ -136,14 +137,14 @@ def _slide(
 ) -> list[pymunk.Shape | pymunk.Constraint]:
     circle = pymunk.Circle(body, scenario.slice_height / 2)
     circle.elasticity = scenario.restitution
-    circle.friction = knobs.friction
+    circle.friction = fixed.FRICTION
     rods.meets_walls_only(circle, SLICE_GROUP)
-    reach = knobs.groove_reach * scenario.bottle.length
+    reach = fixed.GROOVE_REACH * scenario.bottle.length
     groove = pymunk.GrooveJoint(tube, body, (0.0, reach), (0.0, -reach), (0.0, 0.0))
     groove.error_bias = knobs.error_bias
     parts: list[pymunk.Shape | pymunk.Constraint] = [circle, groove]
     if scenario.drag > 0.0:
-        anchor = (0.0, knobs.anchor_distance * scenario.bottle.length)
+        anchor = (0.0, fixed.ANCHOR_DISTANCE * scenario.bottle.length)
         parts.append(pymunk.DampedSpring(tube, body, anchor, (0.0, 0.0), anchor[1], 0.0, scenario.drag))
     return parts
 

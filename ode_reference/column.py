@@ -35,18 +35,13 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
-from ode_reference.arguments import number_above, number_within
 from slicemodel.scenario import Scenario
-from slicemodel.trajectory import FloatArray, Impacts, Trajectory, check_states, output_times
+from slicemodel.trajectory import NO_IMPACTS, FloatArray, Trajectory
 
 NAME: Final = "column"
 """The model of this module, as ``ode_reference.solve`` knows it."""
-
-RTOL: Final = 1e-12
-ATOL: Final = 1e-14
 
 
 class Column:
@@ -84,22 +79,17 @@ class Column:
         return np.array([omega, speed, (omega**2 * self.growth(h) / 2 - rub) / self.mass, rub * speed])
 
 
-def solve(
-    scenario: Scenario, rtol: float | None = None, atol: float | None = None, times: ArrayLike | None = None
-) -> Trajectory:
+def fly(scenario: Scenario, t_out: FloatArray, rtol: float, atol: float) -> Trajectory:
     """Throw a bottle whose water is one uniformly stretching column (derived in this module).
 
     With little water it does not spread and turns like ice, in the paper's bottle below a filling of 0.239;
-    ``diagnostics["spreads"]`` says whether it does.
+    ``diagnostics["spreads"]`` says whether it does. Restitution has no effect; ``n_slices`` only says at how many
+    places the column is reported.
 
     Parameters
     ----------
-    scenario : Scenario
-        Its restitution has no effect; ``n_slices`` only says at how many places the column is reported.
-    rtol, atol : float, optional
-        Tolerances of DOP853, in [1e-13, 1e-2] and (0, 1e-2]; 1e-12 and 1e-14 by default.
-    times : array, shape (P,), optional
-        Increasing output times in [0, duration] [s]; 1000 uniform ones by default.
+    t_out : array, shape (P,) - output times [s]
+    rtol, atol : float - tolerances of DOP853
 
     Returns
     -------
@@ -110,25 +100,15 @@ def solve(
         reach the cap; ``lost_at_stop`` and ``lost_to_drag`` [J]; ``energy_residual``, the largest change of the
         energy that neither explains, share of the initial one.
 
-    Raises
-    ------
-    ValueError
-        Naming the argument, its value and the admissible values.
-
     Accuracy
     --------
-    omega to 1e-11 omega_0 and the energy to 1e-11 of itself at the default tolerances.
+    omega to 1e-11 omega_0 and the energy to 1e-11 of itself at the default tolerances of ``ode_reference.solve``.
     """
-    rtol = number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2)
-    atol = number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2)
-    t_out = output_times(scenario, times)
-    check_states(scenario.n_slices, len(t_out), "cut it coarser, or ask for fewer times")
     column = Column(scenario)
     states, diagnostics = _states(scenario, column, t_out, rtol, atol)
     theta, h, speed, _ = states
     n = scenario.n_slices
     share = (np.arange(n) + 0.5) / n
-    none = np.empty(0)
     water_centre = column.length - h / 2
     inertia = np.asarray(column.inertia(h))
     return Trajectory(
@@ -142,7 +122,7 @@ def solve(
         v=-np.outer(speed, share),
         r_cm=(column.water * water_centre + scenario.bottle.mass * column.length / 2) / scenario.total_mass,
         inertia=inertia,
-        impacts=Impacts(none, none.astype(np.int64), none.astype(np.int64), none, none),
+        impacts=NO_IMPACTS,
         settings={"model": NAME, "rtol": rtol, "atol": atol, "method": "DOP853"},
         diagnostics=diagnostics,
     )

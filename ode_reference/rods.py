@@ -43,18 +43,13 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
-from ode_reference.arguments import number_above, number_within
 from slicemodel.scenario import Scenario
-from slicemodel.trajectory import FloatArray, Impacts, Trajectory, output_times
+from slicemodel.trajectory import NO_IMPACTS, FloatArray, Trajectory
 
 NAME: Final = "rods"
 """The model of this module, as ``ode_reference.solve`` knows it."""
-
-RTOL: Final = 1e-12
-ATOL: Final = 1e-14
 
 IMMOBILE: Final = 1e-12
 """Room for the water, and water above the threshold, that count as none [L]."""
@@ -175,19 +170,15 @@ class Rods:
         return -np.diff(place, axis=1) / width, -np.diff(speed, axis=1) / width
 
 
-def solve(
-    scenario: Scenario, rtol: float | None = None, atol: float | None = None, times: ArrayLike | None = None
-) -> Trajectory:
+def fly(scenario: Scenario, t_outputs: FloatArray, rtol: float, atol: float) -> Trajectory:
     """Throw a bottle whose water cannot overlap and does not bounce (derived in this module).
+
+    Restitution has no effect; ``n_slices`` says only in how many parts the water is reported.
 
     Parameters
     ----------
-    scenario : Scenario
-        Its restitution has no effect; ``n_slices`` says only in how many parts the water is reported.
-    rtol, atol : float, optional
-        Tolerances of DOP853, in [1e-13, 1e-2] and (0, 1e-2]; 1e-12 and 1e-14 by default.
-    times : array, shape (P,), optional
-        Increasing output times in [0, duration] [s]; 1000 uniform ones by default.
+    t_outputs : array, shape (P,) - output times [s]
+    rtol, atol : float - tolerances of DOP853
 
     Returns
     -------
@@ -200,23 +191,17 @@ def solve(
 
     Raises
     ------
-    ValueError
-        Naming the argument, its value and the admissible values.
     ArithmeticError
         If the integration fails, or if water that lies on an end would leave it.
 
     Accuracy
     --------
-    omega to 1e-11 omega_0 at the default tolerances, against the quadrature above.
+    omega to 1e-11 omega_0 at the default tolerances of ``ode_reference.solve``, against the quadrature above.
     """
-    rtol = number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2)
-    atol = number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2)
-    t_outputs = output_times(scenario, times)
     rods = Rods(scenario)
     states, piles, arrival = _states(scenario, rods, t_outputs, rtol, atol)
     inertia = np.asarray(rods.inertia(states[1], states[3], piles))
     r, v = rods.parts(scenario.n_slices, states, piles)
-    none = np.empty(0)
     return Trajectory(
         scenario=scenario,
         solver="ode_reference",
@@ -228,7 +213,7 @@ def solve(
         v=v,
         r_cm=rods.length - piles.foot,
         inertia=inertia,
-        impacts=Impacts(none, none.astype(np.int64), none.astype(np.int64), none, none),
+        impacts=NO_IMPACTS,
         settings={"model": NAME, "rtol": rtol, "atol": atol, "method": "DOP853"},
         diagnostics={
             "spreads": rods.spreads,

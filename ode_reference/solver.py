@@ -1,4 +1,4 @@
-"""The verb of this room: one scenario and one equation of motion in, one trajectory out; or many, and a batch."""
+"""The verb of this room: one scenario and one equation of motion in, one trajectory out; or many at a time."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ode_reference.arguments import number_within, velocities_of
 from ode_reference.combinations import is_ours, model_of, require_own_switches
 from ode_reference.models import MODELS
 from ode_reference.motion import Model
 from ode_reference.switches import Switches, are_switches
-from slicemodel.scenario import Scenario, known_name, not_whole, refuse_other, true_or_false
-from slicemodel.trajectory import Trajectory, check_states, output_times, times_given
-
-if TYPE_CHECKING:
-    from ode_reference.flow.api import Batch
+from slicemodel.scenario import Scenario, known_name, not_whole, number_in, refuse_other, true_or_false
+from slicemodel.trajectory import FloatArray, Trajectory, check_states, output_times, times_given
 
 COLUMN: Final = "column"
 RODS: Final = "rods"
 """The names of two models of all the water at once."""
 
+WATER_RTOL: Final = 1e-12
+WATER_ATOL: Final = 1e-14
+"""Default tolerances of these two."""
+
 
 class Water(NamedTuple):
-    """A model of all the water at once, solved by ``ode_reference.NAME``; equation and reason as of other models."""
+    """A model of all the water at once, flown by ``ode_reference.NAME``; equation and reason as of other models."""
 
     equation: str
     reason: str
@@ -107,10 +107,10 @@ def solve(
         choose. Or a method of ``scipy.integrate.solve_ivp`` over all 2N + 1 equations (``ode_reference.witness``): a
         name in ``ode_reference.METHODS``.
     rtol, atol, max_step : float, optional
-        Of those other methods only: relative tolerance of a step, in [1e-13, 1e-2], 1e-10 by default; absolute
-        tolerance, in (0, 1e-2], 1e-13 by default, one number for [rad], [m] and [m/s]; longest step, at least
-        duration / 1e6 [s], by default 1 / |omega0|, within duration / 1e5 and duration, which binds only at rtol above
-        1e-5: no slice has the time to turn twice within a quarter of a step.
+        Of those other methods only: relative tolerance of a step, in [1e-13, 1e-2], 1e-10 by default (1e-12 of "column"
+        and "rods"); absolute tolerance, in (0, 1e-2], 1e-13 by default (1e-14), one number for [rad], [m] and [m/s];
+        longest step, at least duration / 1e6 [s], by default 1 / |omega0|, within duration / 1e5 and duration, which
+        binds only at rtol above 1e-5: no slice has the time to turn twice within a quarter of a step.
     rest_speed : float, optional
         Speed below which a slice that an end pushes back stays there, in [1e-8, 0.1] [m/s]. By default 1e-5, and with
         recoil ``usual_rest_speed``, 1e-3 in the paper's throw: there the tube shakes resting slices off at every
@@ -180,8 +180,11 @@ def solve(
         )  # fmt: skip
         return replace(run, scenario=scenario, settings={**run.settings, "own_inertia": True})
     if isinstance(model, str) and model in WATERS:
-        run = import_module(f"ode_reference.{model}").solve(scenario, rtol, atol, times)
-        return cast(Trajectory, run)
+        rtol = number_in("rtol", WATER_RTOL if rtol is None else rtol, 1e-13, 1e-2)
+        atol = number_in("atol", WATER_ATOL if atol is None else atol, 0.0, 1e-2, open_low=True)
+        t_out = output_times(scenario, times)
+        check_states(scenario.n_slices, len(t_out), "cut it coarser, or ask for fewer times")
+        return cast(Trajectory, import_module(f"ode_reference.{model}").fly(scenario, t_out, rtol, atol))
     chosen = model_named(model)
     known_name("method", method, (TAYLOR, *INTEGRATORS))
     speed, twin = _rest_speed(rest_speed, chosen, scenario), _twin(twin)
@@ -208,8 +211,21 @@ def solve(
     settings = _settings(chosen, speed, energy, twin)
     if speeds is None:
         return api.fly(scenario, t_out, chosen.switches, settings)
-    velocities = velocities_of(scenario, speeds)
+    velocities = _velocities_of(scenario, speeds)
     return api.fly(scenario, t_out, chosen.switches, settings | {"speeds": velocities.tolist()}, speeds=velocities)
+
+
+def _velocities_of(scenario: Scenario, speeds: ArrayLike) -> FloatArray:
+    """Return ``speeds`` as an array if they are N finite numbers, of slices that can move; else raise ValueError."""
+    try:
+        velocities = np.asarray(speeds, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"speeds = {speeds!r} are no numbers") from None
+    if velocities.shape != (scenario.n_slices,) or not np.isfinite(velocities).all():
+        raise ValueError(f"speeds = {speeds!r} are not {scenario.n_slices} finite numbers [m/s]")
+    if scenario.frozen and velocities.any():
+        raise ValueError(f"speeds = {speeds!r} m/s of frozen water: it does not move")
+    return velocities
 
 
 def with_own_inertia(scenario: Scenario) -> Scenario:
@@ -233,7 +249,7 @@ def solve_batch(
     twin: int = 0,
     states: bool = False,
     jobs: int | None = None,
-) -> Batch:
+) -> tuple[Trajectory, ...]:
     """Solve one equation for many throws by "taylor", on all cores; each equals its single run to the last digit.
 
     Parameters
@@ -247,9 +263,8 @@ def solve_batch(
 
     Returns
     -------
-    Batch
-        Arrays ``t``, ``theta``, ``omega`` of shape (K, P), ``status`` of K names; ``batch[k]`` is the Trajectory of
-        throw k, with its impacts.
+    tuple of K Trajectory
+        In the order of the throws.
 
     Raises
     ------
@@ -306,7 +321,7 @@ def _rest_speed(given: float | None, model: Model, scenario: Scenario) -> float:
     """Return the rest speed of a run [m/s]."""
     if given is None:
         return usual_rest_speed(model.switches, scenario)
-    return number_within("rest_speed", given, MIN_REST_SPEED, 0.1, unit=" m/s")
+    return number_in("rest_speed", given, MIN_REST_SPEED, 0.1, " m/s")
 
 
 def _twin(number: int) -> int:

@@ -19,6 +19,7 @@ The program shares with the seven reduced equations the scenario, the trajectory
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Final
@@ -29,14 +30,13 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
 from ode_reference import messages
-from ode_reference.arguments import number_above, number_within
 from ode_reference.contact import FREE, TOUCH, Ends, SideArray, resolve
 from ode_reference.energy import Ledger, nodes
 from ode_reference.impacts import immovable, simultaneous
 from ode_reference.motion import Model, Motion, Throw
 from ode_reference.twins import twin_of
 from slicemodel.observables import grazes, opposite_hits
-from slicemodel.scenario import Scenario, known_name
+from slicemodel.scenario import Scenario, known_name, number_in
 from slicemodel.trajectory import BASE, CAP, FloatArray, Impacts, Trajectory
 
 METHODS: Final = {
@@ -92,11 +92,11 @@ def integrate(
         max_step = min(max(LONGEST_TURN / abs(scenario.omega0), 1e-5 * duration), duration)
     settings = {
         "model": model.name,
-        "rtol": number_within("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2),
-        "atol": number_above("atol", ATOL if atol is None else atol, 0.0, 1e-2),
+        "rtol": number_in("rtol", RTOL if rtol is None else rtol, 1e-13, 1e-2),
+        "atol": number_in("atol", ATOL if atol is None else atol, 0.0, 1e-2, open_low=True),
         "rest_speed": rest_speed,
         "method": known_name("method", method, METHODS),
-        "max_step": number_within("max_step", max_step, duration / STEP_LIMIT, unit=" s"),
+        "max_step": number_in("max_step", max_step, duration / STEP_LIMIT, math.inf, " s"),
         "energy": energy,
         **({"twin": twin} if twin else {}),
     }

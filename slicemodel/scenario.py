@@ -148,6 +148,35 @@ def not_whole(name: str, value: object, minimum: int, maximum: int) -> str:
     return ""
 
 
+def number_in(
+    name: str,
+    value: object,
+    low: float,
+    high: float,
+    unit: str = "",
+    *,
+    open_low: bool = False,
+    open_high: bool = False,
+) -> float:
+    """Return ``value`` as float if it is a number from ``low`` to ``high``, which count unless open; inf never does.
+
+    Raises
+    ------
+    ValueError
+        Naming the value and the range; NaN lies in none.
+    """
+    open_high = open_high or high == math.inf
+    admissible = f"{'(' if open_low else '['}{low:g}, {high:g}{')' if open_high else ']'}{unit}"
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise ValueError(f"{name} = {shown(value)} is not a number (admissible: {admissible})")
+    number = float(value)
+    # Written as "not inside", because NaN passes every "outside" test.
+    inside = (low < number if open_low else low <= number) and (number < high if open_high else number <= high)
+    if not inside:
+        raise ValueError(f"{name} = {number!r}{unit} is outside {admissible}")
+    return number
+
+
 def shown(value: object) -> str:
     """Return how an error message shows a value: as Python writes it, the middle of a long one left out."""
     text = repr(value)

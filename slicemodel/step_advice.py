@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from slicemodel.scenario import Scenario, known_name
+from slicemodel.scenario import Scenario, known_name, number_in
 from slicemodel.schemes import SCHEMES
 from slicemodel.solver import Rebound, solve
 from slicemodel.trajectory import FloatArray
@@ -65,9 +65,7 @@ def required_steps(
     --------
     The step error only. The scheme's limit is an equation of its own and may be far from free flight.
     """
-    # Written as "not inside", because NaN passes every "outside" test.
-    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not 0.0 < tolerance < 1.0:
-        raise ValueError(f"tolerance = {tolerance!r} is outside (0, 1) (a fraction of omega_0)")
+    tolerance = number_in("tolerance", tolerance, 0.0, 1.0, " of omega_0", open_low=True, open_high=True)
     known_name("scheme", scheme, SCHEMES)
     octave, least = 1, math.inf
     good: int | None = None

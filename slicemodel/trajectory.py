@@ -111,6 +111,10 @@ class Impacts:
         return (self[k] for k in range(len(self)))
 
 
+NO_IMPACTS: Final = Impacts(np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
+"""The impacts of water that strikes nothing."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Trajectory:
     """The motion of one throw as one solver sees it. Time is axis 0; arrays are read-only.

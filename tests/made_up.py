@@ -22,6 +22,13 @@ from flipproof.page.render import render
 from flipproof.page.verdict import verdict
 from slicemodel import Scenario, Trajectory
 
+PART_MACROS = (
+    "{% macro draw(figures) %}{% endmacro %}"
+    "{% macro anchor(id, words) %}<a href='#{{ id }}'>{{ words }}</a>{% endmacro %}"
+    "{% macro scroll(words) %}<div>{{ caller() }}</div>{% endmacro %}"
+)
+"""What a chapter's part of the page asks of its page, so that it can be read alone."""
+
 
 def trajectory_of(scenario: Scenario, t=None, *, keeps_slices=False, **told) -> Trajectory:
     """Return a trajectory that is as told and else constant; ``t`` is an array, or a number of points over the throw.

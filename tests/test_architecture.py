@@ -50,7 +50,7 @@ def test_independent_verbs_share_only_nouns(room):
                 assert allowed, f"{file} imports {module} {names or ''}"
 
 
-SHARED_BY_SOLVERS = {"arguments": None, "messages": None, "switches": None, "twins": {"twin_of"}, "motion": {"Throw"}}
+SHARED_BY_SOLVERS = {"messages": None, "switches": None, "twins": {"twin_of"}, "motion": {"Throw"}}
 """Modules of ``ode_reference`` that the witness and the reduced flow may share, and which names of them (None: all)."""
 
 

@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -142,30 +141,6 @@ def is_stiff(now: Any, scenario: Scenario, impacts: Impacts) -> bool:
     return bool(needed > now.step_limit and 2 * recent < now.watch)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Batch(Sequence[Trajectory]):
-    """Many flights under one equation: arrays over all of them, and each one's trajectory.
-
-    Parameters
-    ----------
-    flights : tuple of Trajectory
-    t, theta, omega : (K, P) [s], [rad], [rad/s] - NaN in theta and omega beyond where a flight stopped
-    status : tuple of str - one a flight, as of ``Trajectory``
-    """
-
-    flights: tuple[Trajectory, ...]
-    t: FloatArray
-    theta: FloatArray
-    omega: FloatArray
-    status: tuple[str, ...]
-
-    def __len__(self) -> int:
-        return len(self.flights)
-
-    def __getitem__(self, k: Any) -> Any:
-        return self.flights[k]
-
-
 def fly_all(
     throws: Sequence[Scenario],
     t_out: FloatArray,
@@ -174,7 +149,7 @@ def fly_all(
     settings: Sequence[Mapping[str, Any]],
     *,
     states: bool,
-) -> Batch:
+) -> tuple[Trajectory, ...]:
     """Fly all throws by so many threads, one per core if not said.
 
     Parameters
@@ -184,10 +159,6 @@ def fly_all(
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     with ThreadPoolExecutor(jobs or cores) as pool:
-        flights = tuple(
+        return tuple(
             pool.map(lambda k: fly(throws[k], t_out[k], switches, settings[k], states=states), range(len(throws)))
         )
-    theta, omega = np.full(t_out.shape, np.nan), np.full(t_out.shape, np.nan)
-    for k, flight in enumerate(flights):
-        theta[k, : len(flight.t)], omega[k, : len(flight.t)] = flight.theta, flight.omega
-    return Batch(flights, t_out, theta, omega, tuple(flight.status for flight in flights))

@@ -7,10 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from ode_reference.arguments import number_above, number_within
 from ode_reference.landing.land import followed, state_of, world_of
 from ode_reference.landing.layout import TOUCHED, World
-from slicemodel.scenario import Scenario, refuse_other
+from slicemodel.scenario import Scenario, number_in, refuse_other
 from slicemodel.table import Table, Touch
 from slicemodel.trajectory import FloatArray
 
@@ -58,7 +57,7 @@ def fly(scenario: Scenario, table: Table, *, dt: float = FLIGHT_DT) -> Touch:
     """
     refuse_other("scenario", scenario, Scenario)
     refuse_other("table", table, Table)
-    dt = followed(scenario, number_within("dt", dt, 1e-6, 1e-3, unit=" s"))
+    dt = followed(scenario, number_in("dt", dt, 1e-6, 1e-3, " s"))
     state, world = _released(scenario, table)
     begin = 0.0
     if _room(state, world) <= 0.0:
@@ -98,7 +97,7 @@ def turn(scenario: Scenario, every: float) -> tuple[FloatArray, FloatArray, Floa
     every : float - time between two instants [s], which are at most ``FLIGHT_DT`` late
     """
     refuse_other("scenario", scenario, Scenario)
-    every = number_above("every", every, 0.0, scenario.duration)
+    every = number_in("every", every, 0.0, scenario.duration, " s", open_low=True)
     (q, s, w), world = _released(scenario, Table(height=FAR))
     record = np.full((math.ceil(scenario.duration / every) + 1, 7 + 2 * world.n), np.nan)
     _loop(q, s, w, followed(scenario, FLIGHT_DT), scenario.duration, world, every, record)

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ode_reference.arguments import number_within
-from slicemodel.scenario import Scenario, ScenarioError, known_name, refuse_other
+from slicemodel.scenario import Scenario, ScenarioError, known_name, number_in, refuse_other
 from slicemodel.table import ENERGY_RISE, LAWS, LONGEST_LANDING, Outcome, Table, Touch
 from slicemodel.trajectory import FloatArray
 
@@ -95,7 +94,7 @@ def land(
     refuse_other("touch", touch, Touch)
     refuse_other("table", table, Table)
     chosen = _law(touch.scenario, law)
-    dt = followed(touch.scenario, number_within("dt", dt, 1e-6, 1e-3, unit=" s"))
+    dt = followed(touch.scenario, number_in("dt", dt, 1e-6, 1e-3, " s"))
     world = world_of(touch, table, chosen)
     for step in (dt, *(dt / k for k in REFINED if dt / k >= SHORTEST)):
         runs = _runs_until_two_differ(touch, world, step)

@@ -8,7 +8,7 @@ import pytest
 from engine_worlds import energy
 
 import engine_check
-from engine_check import DEFAULT_DT
+from engine_check import DEFAULT_DT, pymunk_settings
 from engine_check.pymunk_settings import PymunkKnobs
 from engine_check.pymunk_world import BatchReader, build, read_single
 from slicemodel import observables
@@ -215,11 +215,13 @@ def test_a_resting_slice_creeps_as_derived(restitution):
         assert run.r[-1, 0] - run.r[1, 0] == pytest.approx(creep, rel=1e-4, abs=2e-9)
 
 
-def test_position_correction_trades_angular_momentum_for_depth():
-    """Why collision_bias is 1: any correction moves bodies but not their velocities."""
+def test_position_correction_trades_angular_momentum_for_depth(monkeypatch):
+    """Why COLLISION_BIAS is 1: any correction moves bodies but not their velocities."""
     heavy = replace(Scenario(), water_mass=0.1, restitution=0.0).with_slices(10)
     times = np.linspace(0.0, 0.5, 51)
-    ours, corrected = (solve(heavy, times=times, **knobs) for knobs in ({}, {"collision_bias": 0.9**60}))
+    ours = solve(heavy, times=times)
+    monkeypatch.setattr(pymunk_settings, "COLLISION_BIAS", 0.9**60)
+    corrected = solve(heavy, times=times)
     assert ours.diagnostics["angular_momentum_drift"] < 1e-11
     assert corrected.diagnostics["angular_momentum_drift"] > 1e-3
     assert corrected.diagnostics["penetration"] < ours.diagnostics["penetration"]

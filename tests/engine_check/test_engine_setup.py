@@ -19,7 +19,7 @@ from engine_worlds import (
 )
 
 import engine_check
-from engine_check import DEFAULT_DT, SetupError
+from engine_check import DEFAULT_DT, SetupError, pymunk_settings
 from engine_check.pymunk_settings import PymunkKnobs
 from engine_check.pymunk_setup import verify
 from engine_check.pymunk_world import build
@@ -130,7 +130,8 @@ def test_a_seeded_fault_is_refused_by_name(name):
         verified(world)
 
 
-@pytest.mark.parametrize(("knob", "value"), [("groove_reach", 0.4), ("anchor_distance", 0.3)])
-def test_a_knob_that_ends_inside_the_tube_is_refused(knob, value):
+@pytest.mark.parametrize(("setting", "value"), [("GROOVE_REACH", 0.4), ("ANCHOR_DISTANCE", 0.3)])
+def test_a_setting_that_ends_inside_the_tube_is_refused(monkeypatch, setting, value):
+    monkeypatch.setattr(pymunk_settings, setting, value)
     with pytest.raises(SetupError, match="ends inside the tube"):
-        solve(THROW, **{knob: value})
+        solve(THROW)

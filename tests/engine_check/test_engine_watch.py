@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import engine_check
-from engine_check import DEFAULT_DT, watch
+from engine_check import DEFAULT_DT, pymunk_settings, watch
 from engine_check.watch import BOUNDS, State
 from slicemodel import observables
 from slicemodel.scenario import Scenario
@@ -126,7 +126,8 @@ def test_thin_caps_are_tunnelled_and_the_run_says_so(monkeypatch):
     thin_slices = replace(Scenario(), n_slices=2, water_mass=0.005, drag=0.0, duration=0.2)
     times = np.linspace(0.0, 0.2, 21)
     assert "tunnelled" not in solve(thin_slices, dt=2e-3, times=times).message
-    run = solve(thin_slices, dt=2e-3, times=times, cap_thickness=1e-3)
+    monkeypatch.setattr(pymunk_settings, "CAP_THICKNESS", 1e-3)
+    run = solve(thin_slices, dt=2e-3, times=times)
     assert run.status == "diverged"
     assert "tunnelled" in run.message
 

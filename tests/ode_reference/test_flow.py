@@ -337,22 +337,19 @@ def test_a_batch_equals_single_runs_to_the_last_digit(model):
         np.testing.assert_array_equal(result.impacts.time, alone.impacts.time)
         assert dict(result.diagnostics) == dict(alone.diagnostics)
         assert dict(result.settings) == dict(alone.settings)
-        np.testing.assert_array_equal(batch.omega[k], alone.omega)
-        np.testing.assert_array_equal(batch.theta[k], alone.theta)
-        assert batch.status[k] == "ok"
+        assert result.status == "ok"
 
 
-def test_a_batch_keeps_no_slices_unless_asked_and_marks_what_was_not_reached():
+def test_a_batch_keeps_no_slices_unless_asked_and_ends_each_flight_for_itself():
     many = [HALF, replace(HALF), replace(HALF, duration=0.7)]
     object.__setattr__(many[1], "omega0", 1e160)  # no scenario admits it
     batch = solve_batch(many, "eq8", [0.1, 0.5])
-    assert batch.t.shape == batch.theta.shape == batch.omega.shape == (3, 2)
-    assert batch.status == ("ok", "overflow", "ok")
-    assert np.isnan(batch.omega[1]).all()
+    assert [len(run.omega) for run in batch] == [2, 0, 2]
+    assert [run.status for run in batch] == ["ok", "overflow", "ok"]
     assert batch[0].r.shape == (0, 20)
     np.testing.assert_array_equal(batch[2].omega, solve(many[2], "eq8", [0.1, 0.5]).omega)
-    each = solve_batch(many[:1], "eq8", [[0.2, 0.3]])
-    np.testing.assert_array_equal(each.t, [[0.2, 0.3]])
+    (each,) = solve_batch(many[:1], "eq8", [[0.2, 0.3]])
+    np.testing.assert_array_equal(each.t, [0.2, 0.3])
 
 
 def test_threads_share_nothing():

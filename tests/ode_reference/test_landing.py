@@ -350,7 +350,7 @@ def test_what_is_no_touch_or_table_or_law_is_refused_by_name(land):
 
 
 def test_a_step_of_an_engine_that_would_take_for_ever_is_refused():
-    with pytest.raises(ValueError, match=r"dt = 1e-12 s is outside \(5e-09, 0\.001\) s"):
+    with pytest.raises(ValueError, match=r"dt = 1e-12 s is outside \(5e-09, 0\.001\] s"):
         engine_check.land(at_rest(WATER), Table(height=0.0), dt=1e-12)
 
 

@@ -9,8 +9,6 @@ import pytest
 from flipproof.chapters.engine_facts.chapter import (
     FACTS,
     depth_left,
-    figure_gallery,
-    figures,
     plan_engine_facts,
     rebound_of_two,
     speed_through_wall,
@@ -106,17 +104,3 @@ def test_without_slop_nothing_stays_sunk():
     assert none == 0.0
     assert left > 5e-3
     assert abs(without) < 1e-6
-
-
-def test_the_gallery_has_fact_number_threshold_and_sign(facts):
-    changed = facts | {
-        "stagger": replace(facts["stagger"], value=-0.5),
-        "mujoco-limit": replace(facts["mujoco-limit"], value=None),
-    }
-    findings = tuple(changed[fact.id] for fact in FACTS)
-    texts = [text.get_text() for text in figure_gallery(findings).axes[0].texts]
-    assert {"fact", "number", "threshold", "✓", "✗", "–", "≤ 1e-09", "-0.500 steps"} <= set(texts)
-    (exhibit,) = figures((findings[0], findings))
-    assert "10 of 12" in exhibit.caption
-    assert "-0.500 steps, threshold 0.49 to 0.51, fail" in exhibit.alt
-    assert exhibit.drawing.svg.startswith("<?xml")

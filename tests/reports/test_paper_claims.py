@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up import trajectory_of
+from made_up import PART_MACROS, trajectory_of
 
 from flipproof.chapters import chapters_named
 from flipproof.frame.flights import Flights as Answers
@@ -695,13 +695,8 @@ def test_free_flight_does_not_know_where_down_is():
 def test_the_page_shows_every_verdict_with_word_sign_and_number(runs, read_page):
     templates = environment()
     verdicts = judge_paper(runs)
-    macros = (
-        "{% macro draw(figures) %}{% endmacro %}"
-        "{% macro anchor(id, words) %}<a href='#{{ id }}'>{{ words }}</a>{% endmacro %}"
-        "{% macro scroll(words) %}<div>{{ caller() }}</div>{% endmacro %}"
-    )
     text = templates.from_string(
-        macros + chapters_named("paper")[0].chapters[0].template.read_text(encoding="utf-8")
+        PART_MACROS + chapters_named("paper")[0].chapters[0].template.read_text(encoding="utf-8")
     ).render(paper=verdicts, figures=())
     page = read_page(text)
     assert len(set(page.ids)) == len(page.ids)

@@ -213,7 +213,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
         ('name = "eq8"\nmethod = "DOP853"\nrtol = 7.0', r"2 \(eq8\): rtol = 7.0 is outside \[1e-13, 0.01\]"),
         ('name = "eq8"\nmethod = "DOP"', "did you mean 'DOP853'"),
         ('name = "midpoint"\nsteps = 1', r"2 \(midpoint\): steps = 1 is not a whole number in \[2, "),
-        ('name = "pymunk"\ncolision_bias = 1.0', "did you mean 'collision_bias'"),
+        ('name = "pymunk"\neror_bias = 1.0', "did you mean 'error_bias'"),
     ],
 )
 def test_a_setting_out_of_range_is_refused_before_the_first_point(settings, words):

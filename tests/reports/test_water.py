@@ -5,9 +5,11 @@ from dataclasses import replace
 import grid_water
 import numpy as np
 import pytest
+from made_up import PART_MACROS
 
 from flipproof.build import ask_of
-from flipproof.chapters.water.chapter import CHAPTER, claims, figures, summary, verdict
+from flipproof.chapters import chapters_named
+from flipproof.chapters.water.chapter import CHAPTER, claims, figures, shown, summary
 from flipproof.chapters.water.statements import flights, held, standing
 from flipproof.chapters.water.study import (
     DISCS,
@@ -26,6 +28,7 @@ from flipproof.chapters.water.study import (
 )
 from flipproof.figures.style import draw
 from flipproof.frame.solvers import make
+from flipproof.output.templating import environment
 from flipproof.paper.cases import family
 from flipproof.paper.experiment import OBSERVATIONS
 from flipproof.paper.observe import steady_level
@@ -151,7 +154,12 @@ def test_findings_say_what_is_recorded_and_a_missing_run_is_no_number(found):
 def test_figure_and_table_hold_every_equation(found):
     (exhibit,) = figures(found)
     assert draw(exhibit.maker(*exhibit.data)).svg
-    table = verdict(found)
-    assert [len(row.cells) for row in table.rows] == [len(table.fillings)] * len(EQUATIONS)
-    assert [float(row.distance) for row in table.rows] == sorted(float(row.distance) for row in table.rows)
+    given = shown(found)
+    distances = [f"{found.distance(equation):.3f}" for equation in given["equations"]]
+    assert set(given["equations"]) == set(EQUATIONS)
+    assert distances == sorted(distances, key=float)
+    (part,) = chapters_named("water")
+    page = environment().from_string(PART_MACROS + part.chapters[0].template.read_text(encoding="utf-8"))
+    table = page.render(found=found, figures=(), **given).split("</table>")[0]
+    assert table.count('<br><span class="soft">') == len(given["fillings"]) * len(EQUATIONS)
     assert CHAPTER.work.keys() == {"quick", "full"}

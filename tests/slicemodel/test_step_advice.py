@@ -12,10 +12,8 @@ SMALL = Scenario().with_slices(5)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        *(
-            ((tolerance,), r"tolerance = .* is outside \(0, 1\)")
-            for tolerance in (0.0, -1e-3, 1.0, math.nan, math.inf, "small", True)
-        ),
+        *(((tolerance,), r"tolerance = .* is outside \(0, 1\)") for tolerance in (0.0, -1e-3, 1.0, math.nan, math.inf)),
+        *(((tolerance,), r"tolerance = .* is not a number \(admissible: \(0, 1\)") for tolerance in ("small", True)),
         ((1e-3, "midpont"), "did you mean 'midpoint'"),
         ((1e-3, ["midpoint"]), r"scheme = \['midpoint'\] is unknown"),
         # Its slices escape.

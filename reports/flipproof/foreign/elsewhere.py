@@ -34,7 +34,7 @@ from flipproof.foreign.place import name_of, placing, switches_of
 from ode_reference.solver import usual_rest_speed
 from ode_reference.switches import Switches
 from slicemodel import Bottle, Scenario, Trajectory
-from slicemodel.trajectory import FloatArray, Impacts
+from slicemodel.trajectory import NO_IMPACTS, FloatArray, Impacts
 
 SEED: Final = 26
 """Seed of the throws where none is named."""
@@ -479,8 +479,6 @@ def _onset(ask: Ask, impacts: Impacts, first_wrong: float) -> tuple[int, str]:
 
 AT_ONCE: Final = "at one instant"
 
-
-NO_IMPACTS: Final = Impacts(np.empty(0), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
 
 FAINT: Final = 0.02
 """Speed, fraction of L omega_0, below which an impact need not be answered: a slice may rest there."""

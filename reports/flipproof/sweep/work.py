@@ -201,7 +201,7 @@ def _fly(
 
         try:
             possible = [throw for throw in scenarios if isinstance(throw, Scenario)]
-            flights = iter(ode_reference.solve_batch(possible, solver, jobs=1, **settings).flights)
+            flights = iter(ode_reference.solve_batch(possible, solver, jobs=1, **settings))
             return [next(flights) if isinstance(throw, Scenario) else throw for throw in scenarios]
         except Exception:  # one of them cannot be solved: alone each says what is wrong with it
             pass

@@ -8,22 +8,18 @@ x points to the right and y up; the engines are imported where a world is built.
 from __future__ import annotations
 
 import math
-import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from flipproof.chapters.solvers import ENGINE
 from flipproof.curves.ensemble import claim_change, largest_change
 from flipproof.figures.spoken import spoken
-from flipproof.figures.style import new_figure, styled
-from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Exhibit, Finding, Run, RunResult, Study, judged
-from flipproof.frame.columns import rows_csv
-from flipproof.frame.findings import finite_or_none, regression
+from flipproof.frame.chapter import Absent, Ask, Chapter, Claims, Finding, Run, RunResult, Study, judged
+from flipproof.frame.findings import regression
 from flipproof.frame.solvers import Missing, without_gravity
 from slicemodel import Scenario, Trajectory
 
@@ -311,7 +307,7 @@ FACTS: Final = (
     EngineFact("mujoco", "mujoco-limit", "", (0.0, 0.3), soft_limit),
     EngineFact("mujoco", "mujoco-contact", "mm", (0.01, 10.0), soft_contact),
 )
-"""Every fact, in the order of the table."""
+"""Every fact, in the order of the page."""
 
 
 CHECK_DT: Final = 4e-4
@@ -350,60 +346,6 @@ def claim_gravity_cancels(with_gravity: Trajectory, without: Trajectory) -> Find
     return claim_change("engine-gravity", title, with_gravity, without, 1e-9, differ=differ, note=note)
 
 
-def figures(results: EngineFacts) -> Iterator[Exhibit]:
-    """Yield the table of facts, each with its number and threshold in the unit of its row."""
-    _, findings = results
-    words = " ".join(
-        f"{finding.title}: {finding.value_text}, threshold {finding.threshold_text}, {finding.verdict}."
-        for finding in findings
-    )
-    held = sum(finding.verdict == "pass" for finding in findings)
-    unit = "[unit of the row]"
-    rows = [
-        (fact.engine, WORDS[fact.id], f.value, f.unit or "1", *map(finite_or_none, f.admissible), f.verdict)
-        for fact, f in zip(FACTS, findings, strict=True)
-    ]
-    yield Exhibit(
-        name="engine-facts",
-        title="Engine behaviour that a user may not expect",
-        caption=f"Each fact is measured anew with every report, and the sign says whether the number lies within its "
-        f"threshold: {held} of {len(findings)} do. The engine check is set so that none of them changes "
-        "a result unnoticed; how each was measured stands with the findings.",
-        alt=f"Table of facts about the engines. {words}".replace("ω₀", "omega_0"),
-        maker=figure_gallery,
-        data=(findings,),
-        table=rows_csv(
-            ("engine", "fact", f"number {unit}", "unit", f"at least {unit}", f"at most {unit}", "verdict"), rows
-        ),
-    )
-
-
-@styled
-def figure_gallery(findings: Sequence[Finding]) -> Figure:
-    """Table of the findings of ``FACTS``: fact, number, threshold, sign."""
-    columns = {"fact": 0.0, "number": 0.66, "threshold": 0.8, "": 0.955}
-    signs = {"pass": ("✓", "#0B6E4F"), "fail": ("✗", "#B00020")}
-    texts = [textwrap.wrap(finding.title, 76) for finding in findings]
-    lines = sum(len(text) for text in texts) + 0.6 * len(texts) + 1.6
-    figure, axes = new_figure(size=(8.0, 0.2 * lines + 0.1))
-    axes.set_axis_off()
-    axes.set(xlim=(0, 1), ylim=(lines, 0))
-    for heading, x in columns.items():
-        axes.text(x, 0.9, heading, fontsize=9, fontweight="bold", va="center")
-    top = 1.5
-    for finding, text in zip(findings, texts, strict=True):
-        axes.axhline(top, color="#cccccc", linewidth=0.8)
-        middle = top + 0.3 + len(text) / 2
-        cells = ("\n".join(text), finding.value_text, finding.threshold_text)
-        for x, cell in zip(columns.values(), cells, strict=False):
-            axes.text(x, middle, cell, fontsize=8.5, va="center", linespacing=1.25, color="black")
-        sign, colour = signs.get(finding.verdict, ("–", "#666666"))
-        axes.text(columns[""], middle, sign, fontsize=12, va="center", linespacing=1.25, color=colour)
-        top += len(text) + 0.6
-    axes.axhline(top, color="#cccccc", linewidth=0.8)
-    return figure
-
-
 CHAPTER: Final = Chapter(
-    "engine-facts", "Engine behaviour that a user may not expect", study, claims, figures, kind="regression"
+    "engine-facts", "Engine behaviour that a user may not expect", study, claims, kind="regression"
 )

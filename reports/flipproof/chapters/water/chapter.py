@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from matplotlib.figure import Figure
 
-from flipproof.chapters.water.statements import NAMES, Held, held, standing
+from flipproof.chapters.water.statements import NAMES, held, standing
 from flipproof.chapters.water.study import (
     DISCS,
     EQUATIONS,
@@ -29,7 +29,6 @@ from flipproof.frame.chapter import Chapter, Claims, Exhibit, observed
 from flipproof.frame.columns import columns_csv
 from flipproof.frame.findings import finite_or_none
 from ode_reference.solver import COLUMN, RODS
-from slicemodel.trajectory import FloatArray
 
 LIMITS: Final = (
     "May be said: from three quarters full on, these fluids contradict overlap. At half full the plateau of Eq. 8 "
@@ -46,36 +45,6 @@ LIMITS: Final = (
     "physics. We know of no public measured track."
 )
 """What may be concluded, and what not."""
-
-
-class Row(NamedTuple):
-    """One line of the table: an equation, its plateau and what it misses by filling, and why it misses water."""
-
-    name: str
-    cells: tuple[tuple[str, str], ...]
-    distance: str
-    apart: tuple[str, ...]
-    times: tuple[str, ...]
-    why: str
-
-
-class Shown(NamedTuple):
-    """What the page shows."""
-
-    fillings: tuple[float, ...]
-    band: tuple[str, ...]
-    recorded_band: tuple[str, ...]
-    own_band: tuple[str, ...]
-    starts: tuple[str, ...]
-    times: tuple[str, ...]
-    rows: tuple[Row, ...]
-    recorded: Any
-    own_fluid: Any
-    curves: tuple[float, ...]
-    statements: tuple[Held, ...]
-    agrees: str
-    kinds: tuple[str, ...] = tuple(NAMES.values())
-    limits: str = LIMITS
 
 
 def claims(water: Water) -> Claims:
@@ -96,50 +65,33 @@ def claims(water: Water) -> Claims:
         yield observed(f"water-own-inertia-{equation}", title, finite_or_none(change), "of ω₀", note)
 
 
-def verdict(water: Water) -> Shown:
-    """Return the table of the page."""
-    wanted = tuple(float(fill) for fill in fluid_band()[0])
-    flights = late_fluid()
-    starts = {float(f): f"{a:.2f} to {b:.2f}" for f, a, b in zip(*start_band(), strict=True)}
-    rows = tuple(
-        Row(
-            name_of(equation),
-            tuple(
-                (
-                    f"{water.at(equation, f):.3f}",
-                    f"{water.miss(equation, f):+.3f}" if water.miss(equation, f) else "inside",
-                )
-                for f in wanted
-            ),
-            f"{water.distance(equation):.3f}",
-            tuple(f"{value:.3f}" for value in water.apart[equation].values()),
-            tuple(_seconds(water.time(equation, f)) for f in flights),
-            why,
-        )
-        for equation, why in EQUATIONS.items()
-    )
-    return Shown(
-        wanted,
-        _ranges(fluid_band()),
-        _ranges(recorded_band()),
-        _ranges(own_band()),
-        tuple(starts.get(f, "–") for f in wanted),
-        tuple(f"{f:g}: {_seconds(flight['early'])}" for f, flight in flights.items()),
-        tuple(sorted(rows, key=lambda row: float(row.distance))),
-        fluids(),
-        own_fluid(),
-        tuple(flights),
-        (statements := held()),
-        standing(statements),
-    )
-
-
-def _ranges(band: tuple[FloatArray, FloatArray, FloatArray]) -> tuple[str, ...]:
-    return tuple(f"{a:.2f} to {b:.2f}" if math.isfinite(a) else "–" for _, a, b in zip(*band, strict=True))
-
-
-def _seconds(time: float) -> str:
-    return f"{time:.3f} s" if math.isfinite(time) else "never"
+def shown(water: Water) -> dict[str, Any]:
+    """Return what the part of the page shows beside the plateaus: ranges of fluids by filling, and statements."""
+    ranges = {
+        "all fluids": fluid_band(),
+        "two fluids, recorded": recorded_band(),
+        "our own ideal water": own_band(),
+        "the recorded grid and ours, by the start of their water": start_band(),
+    }
+    statements = held()
+    return {
+        "fillings": fluid_band()[0],
+        "bands": {
+            name: {fill: (low, high) for fill, low, high in zip(*band, strict=True) if math.isfinite(low)}
+            for name, band in ranges.items()
+        },
+        # By what is printed, so that equals stay in order.
+        "equations": sorted(EQUATIONS, key=lambda equation: round(water.distance(equation), 3)),
+        "why": EQUATIONS,
+        "name_of": name_of,
+        "fluids": fluids(),
+        "own_fluid": own_fluid(),
+        "late_fluid": late_fluid(),
+        "statements": statements,
+        "agrees": standing(statements),
+        "kinds": NAMES.values(),
+        "limits": LIMITS,
+    }
 
 
 def figures(water: Water) -> Iterator[Exhibit]:
@@ -230,5 +182,5 @@ CHAPTER: Final = Chapter(
     claims=claims,
     figures=figures,
     summary=summary,
-    page=lambda water: {"water": verdict(water)},
+    page=shown,
 )
