@@ -15,23 +15,20 @@ import pytest
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
 from flipproof.chapters.guests.chapter import claims, summarise
-from flipproof.chapters.guests.study import FREE, energy_of, placed_on, start_of
+from flipproof.chapters.guests.study import energy_of, placed_on
 from flipproof.chapters.solvers import SPARSE, facts_of, invited
-from flipproof.chapters.waterfall.chapter import figure_waterfall
 from flipproof.cli import main as cli
 from flipproof.foreign import certify as suite
 from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import content_of, load
 from flipproof.frame.exhibit import drawn
-from flipproof.frame.flights import Call, ChapterError
+from flipproof.frame.flights import Call
 from flipproof.frame.gather import evaluate, gather
 from flipproof.frame.pool import SerialExecutor, workers
 from flipproof.frame.run_store import RunStore
 from flipproof.frame.solvers import solve
 from flipproof.output.summary import summary_text
-from ode_reference.models import MODELS
 from slicemodel import Scenario
-from slicemodel.observables import plateau
 
 ROOT = Path(__file__).resolve().parents[2]
 RK4 = f"{ROOT / 'examples' / 'foreign' / 'rk4.py'}:Eq8"
@@ -186,7 +183,7 @@ def test_energy_falls_in_free_flight_and_is_that_of_turning_in_ice():
 
 
 def test_every_figure_is_drawn_with_its_numbers(reported):
-    names = ["guests-convergence", "guest-naive-rk4-waterfall", "guest-naive-rk4-no-gravity-waterfall", "ice", "omega"]
+    names = ["guests-convergence", "ice", "omega"]
     exhibits = drawn([reported.figures()[name] for name in names], SerialExecutor())
     assert all(exhibit.table.count("\n") > 1 for exhibit in exhibits)
 
@@ -214,8 +211,7 @@ def test_a_hostile_guest_is_named_with_its_reason(tmp_path, name):
     assert all(finding.id.startswith(f"guest-{bad.guest.slug}-") for finding in found.failed)
     pattern = load(f"{HOSTILE}:WRONG").get(name, "5 is neither callable").replace("2 s", "1 s")
     assert any(re.search(pattern, finding.note) for finding in found.failed)
-    assert bad.waterfall.result is None
-    assert good.waterfall.result is not None
+    assert len(good.refined) == 4
     assert json.dumps(summarise(bad), allow_nan=False)
 
 
@@ -309,46 +305,5 @@ def test_check_refuses_a_guest_that_is_a_curve_or_named_twice(tmp_path, capsys):
         assert words in capsys.readouterr().err
 
 
-def test_what_leads_from_a_guest_to_free_flight_is_split(reported):
-    free = plateau(TIMES, solve("free-flight", THROW, times=TIMES).omega, THROW.omega0)
-    for visit, names in zip(reported.visits, ({"weightless", "origin", "recoil"}, {"origin", "recoil"}), strict=True):
-        found, data = visit.waterfall.result, summarise(visit)["waterfall"]
-        rest, *bars = found.bars
-        assert set(data["bars"]) == names
-        assert found.end == pytest.approx(free, abs=1e-12)
-        assert found.start + sum(bar.average for bar in found.bars) == pytest.approx(found.end, abs=1e-15)
-        assert abs(rest.average) < 1e-3 < abs(found.total)
-        assert all(bar.low <= bar.average <= bar.high for bar in bars)
-        assert reported.findings[f"guest-{visit.guest.slug}-waterfall"].value == found.total
-        level, axes = found.start, figure_waterfall(found).axes[0]
-        for patch, bar in zip(axes.patches[2:], found.bars, strict=False):
-            assert (patch.get_x(), patch.get_width()) == pytest.approx((level, bar.average), abs=1e-12)
-            level += bar.average
-        assert axes.get_yticklabels()[0].get_text() == visit.guest.label
-    # Each order of mending two assumptions is one of two: the mean is the middle of the range.
-    assert all(bar.average == pytest.approx((bar.low + bar.high) / 2) for bar in bars)
+def test_the_provenance_says_which_code_a_guest_is(reported):
     assert facts_of(reported.guests)["naive RK4"] == f"{RK4}, files {content_of(RK4):.12}"
-
-
-def test_a_guest_without_an_equation_or_with_the_wrong_one_has_its_rest(tmp_path, reported):
-    def started(equation, nearest):
-        visit = reported.visits[0]
-        guest = replace(visit.guest, traits=Traits(name="mine", equation=equation))
-        return start_of(replace(visit, guest=guest, equation=nearest))
-
-    assert started("exact-step", "free-flight") == MODELS["eq8"].switches
-    assert started("paper-typeset", "eq8") is None
-    assert started(None, "") is None
-    assert started(None, "eq8") == MODELS["eq8"].switches
-    # A guest of Eq. 8 that declares free flight: all of the difference is the rest.
-    spec = mine(tmp_path, "wrong", "        return super().solve(ask)\n    equation = 'free-flight'\n")
-    found = Reported(spec, chapters=("guests",)).visits[0]
-    assert start_of(found) == FREE
-    (rest,) = found.waterfall.result.bars
-    assert rest.average == found.waterfall.result.total
-
-
-def test_bars_that_miss_the_whole_are_a_mistake_of_the_program(monkeypatch):
-    monkeypatch.setattr("flipproof.chapters.waterfall.study.mean", lambda changes: 0.9 * changes[0][1])
-    with pytest.raises(ChapterError, match="ArithmeticError: the bars miss"):
-        Reported(RK4, chapters=("guests",))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,35 +10,26 @@ from matplotlib.figure import Figure
 
 from flipproof.chapters.guests.study import Visit, study
 from flipproof.chapters.solvers import UNREFINED
-from flipproof.chapters.waterfall.chapter import bars_csv, figure_waterfall
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, styled
 from flipproof.foreign.certify import findings_of
-from flipproof.frame.chapter import Absent, Band, Chapter, Claims, Exhibit, observed, regression
+from flipproof.frame.chapter import Absent, Chapter, Claims, Exhibit, observed, regression
 from flipproof.frame.columns import rows_csv
-from flipproof.frame.equations import NAMES
 
 FLOOR: Final = 1e-12
 """Least error that is drawn [omega_0]."""
 
 
 def claims(visits: Sequence[Visit]) -> Claims:
-    """Yield each check of every guest's certificate, and what leads from it to free flight."""
+    """Yield each check of every guest's certificate, its flight and its energy."""
     for visit in visits:
         guest = visit.guest
         head, label = f"guest-{guest.slug}", guest.label
         if visit.certificate.result is not None:
             yield from findings_of(visit.certificate.result, f"{head}-certify-", f"{label}: ")
         for name, reason in visit.problems.items():
-            idle = name == "waterfall" or (name == "certificate" and guest.curve)
+            idle = name == "certificate" and guest.curve
             name = name.removeprefix(f"{label}, ").replace(" ", "-")
             yield Absent(f"{head}-{name}-missing", f"{label}: {name}", reason, "observation" if idle else "regression")
-        if (waterfall := visit.waterfall.result) is not None:
-            remainder, *bars = waterfall.bars
-            parts = ", ".join(f"{bar.name} {bar.average:+.3g}" for bar in bars) or "none"
-            title = f"{label}: mean of ω/ω₀ over the second half, free flight minus it"
-            note = f"fair shares of what its equation assumes: {parts}; {remainder.name} {remainder.average:+.2g}"
-            band = Band.of(visit.band, "refinement")
-            yield observed(f"{head}-waterfall", title, waterfall.total, "", note, band=band)
         if visit.placed is not None:
             rung, deviation = visit.placed
             room = UNREFINED if visit.band is None else 1e-3 + 5 * visit.band
@@ -51,26 +42,9 @@ def claims(visits: Sequence[Visit]) -> Claims:
 
 
 def figures(visits: Sequence[Visit]) -> Iterator[Exhibit]:
-    """Yield what refinement buys the guests, and the waterfall of each."""
+    """Yield what refinement buys the guests."""
     if refined := [visit for visit in visits if len(visit.refined) > 1]:
         yield _draw_convergence(refined)
-    for visit in visits:
-        if (waterfall := visit.waterfall.result) is not None:
-            bars = ", ".join(f"{bar.name} {bar.average:+.3f}" for bar in waterfall.bars)
-            yield Exhibit(
-                name=f"guest-{visit.guest.slug}-waterfall",
-                title=f"From {visit.guest.label} to free flight",
-                caption="Left: from the guest's mean of ω/ω₀ over the second half to that of free flight. The bar “the "
-                "rest” leads to the equation that the guest solves; no assumption explains it; its error bar is the "
-                "guest's own band. Every other bar is the fair share of an assumption of that equation, the mean over "
-                "all orders of changing them. Right: the same in single orders; where the marks lie apart, assumptions "
-                "interact. Below the dotted line: what forbidding overlap changes, no share.",
-                alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
-                f"{waterfall.end:.3f} by {bars}.",
-                maker=figure_waterfall,
-                data=(waterfall,),
-                table=bars_csv(waterfall),
-            )
 
 
 def _draw_convergence(visits: Sequence[Visit]) -> Exhibit:
@@ -111,18 +85,7 @@ def figure_convergence(visits: Sequence[Visit]) -> Figure:
 
 def summarise(visit: Visit) -> dict[str, Any]:
     """Return a guest as JSON-ready data."""
-    guest, certificate, waterfall = visit.guest, visit.certificate.result, visit.waterfall.result
-    split: Mapping[str, Any] | None = None
-    if waterfall is not None:
-        remainder, *bars = waterfall.bars
-        switch = {words: name for name, words in NAMES.items()}
-        split = {
-            "guest": waterfall.start,
-            "free-flight": waterfall.end,
-            "rest": remainder.average,
-            "bars": {switch[bar.name]: bar.average for bar in bars},
-            "ranges": {switch[bar.name]: [bar.low, bar.high] for bar in bars},
-        }
+    guest, certificate = visit.guest, visit.certificate.result
     return {
         "spec": guest.spec,
         "content": guest.content,
@@ -135,7 +98,6 @@ def summarise(visit: Visit) -> dict[str, Any]:
             {"effort": effort.effort, "seconds": round(effort.seconds, 4), "error": effort.error}
             for effort in visit.refined
         ],
-        "waterfall": split,
         "energy_rise": visit.rise,
     }
 

@@ -4,47 +4,26 @@ It is certified in a worker. Its runs of the throw at four efforts say what refi
 in the frame of the centre of mass C_M, is that of turning and of sliding (Koenig):
 
     E = J omega^2 / 2 + sum_i m (v_i - v_CM)^2 / 2 + M_b v_CM^2 / 2
-
-The difference to free flight is split over the assumptions that its equation still makes:
-
-    plateau of free flight - plateau of the guest = rest + sum of fair shares
-
-The rest is the plateau of the guest's equation minus that of the guest: its own error, and what is no assumption of the
-ladder. A fair share is the mean over all orders of changing the assumptions (``chapters.waterfall``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from flipproof.chapters.solvers import SPARSE, Guest
-from flipproof.chapters.waterfall.study import (
-    OBSERVABLES,
-    Bar,
-    Waterfall,
-    bars_of,
-    equation_run,
-    missed_by,
-    rods_run,
-)
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.contract import ForeignError
-from flipproof.foreign.place import name_of, switches_of
 from flipproof.foreign.solving import opened
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Outcome, Run, Study, attempt
-from flipproof.frame.equations import NAMES
-from ode_reference.models import LADDER, MODELS
-from ode_reference.switches import Switches
-from slicemodel import Scenario, Trajectory
-from slicemodel.observables import centre_of_mass_velocity, plateau
+from ode_reference.models import LADDER
+from slicemodel import Trajectory
+from slicemodel.observables import centre_of_mass_velocity
 from slicemodel.trajectory import FloatArray
-
-FREE: Final = MODELS["free-flight"].switches
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +51,6 @@ class Visit:
     band: float | None
     efforts: Mapping[str, Outcome[Effort]]
     rise: float | None
-    waterfall: Outcome[Waterfall]
     placed: tuple[str, float] | None = None
 
     @property
@@ -80,8 +58,8 @@ class Visit:
         """What is missing, and why."""
         if self.guest.problem:
             return {"solver": self.guest.problem}
-        outcomes: dict[str, Outcome[Any]] = {"certificate": self.certificate, "waterfall": self.waterfall}
-        return {name: outcome.reason for name, outcome in {**outcomes, **self.efforts}.items() if outcome.reason}
+        outcomes: dict[str, Outcome[Any]] = {"certificate": self.certificate, **self.efforts}
+        return {name: outcome.reason for name, outcome in outcomes.items() if outcome.reason}
 
     @property
     def refined(self) -> list[Effort]:
@@ -117,18 +95,10 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
                 band=guest.band(ask.throw, flights),
                 efforts={run.name: attempt(effort_of, run, rungs.get(equation), flights) for run in runs},
                 rise=rise_of(flight) if flight is not None and len(flight.v) == len(flight.t) else None,
-                waterfall=Outcome(None, "" if flight is None else "what it declares is no equation of the ladder"),
                 placed=placed_on(guest, certificate.result, rungs, flight),
             )
         )
-    starts = {visit.guest: start for visit in visits if (start := start_of(visit)) is not None}
-    flights = yield plan_splits(starts.values(), ask.throw)
-    return tuple(
-        replace(visit, waterfall=attempt(split, visit, ask.throw, starts[visit.guest], flights))
-        if visit.guest in starts
-        else visit
-        for visit in visits
-    )
+    return tuple(visits)
 
 
 def placed_on(
@@ -182,79 +152,3 @@ def energy_of(run: Trajectory) -> FloatArray:
     sliding = scenario.slice_mass * ((run.v - drift[:, None]) ** 2).sum(axis=1) + scenario.bottle.mass * drift**2
     energy = (run.inertia * run.omega**2 + sliding) / 2
     return np.asarray(energy / energy[0])
-
-
-# ---------------------------------------------------------------------- from a guest to free flight
-
-
-def start_of(visit: Visit) -> Switches | None:
-    """Return the switches of the equation that a guest declares, else of its place, else of the nearest rung.
-
-    None if it did not fly, or if what it declares converges to no equation of the ladder.
-    """
-    traits, certificate = visit.guest.traits, visit.certificate.result
-    if traits is not None and traits.equation is not None:
-        try:
-            return switches_of(traits.equation)
-        except ValueError:
-            return None
-    if (place := place_in(certificate)) is not None:
-        return Switches.from_name(place["switches"])
-    return switches_of(visit.equation) if visit.equation else None
-
-
-def differing(start: Switches) -> list[str]:
-    """Return the assumptions that an equation makes and free flight does not."""
-    return [name for name in NAMES if getattr(start, name) != getattr(FREE, name)]
-
-
-def mended(start: Switches, names: Iterable[str]) -> Switches:
-    """Return an equation with some assumptions mended."""
-    return replace(start, **{name: getattr(FREE, name) for name in names})
-
-
-def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
-    """Return the runs that the splits need."""
-    runs: dict[Run, None] = {}
-
-    def ask(start: Switches, names: Sequence[str]) -> float:
-        runs[equation_run(throw, mended(start, names))] = None
-        return 0.0
-
-    for start in starts:
-        bars_of(differing(start), lambda names, start=start: ask(start, names), lambda _: 0.0)  # type: ignore[misc]
-        ask(start, ())
-        runs[rods_run(throw)] = None
-    return list(runs)
-
-
-def split(visit: Visit, throw: Scenario, start: Switches, flights: Flights) -> Waterfall:
-    """Split the difference between a guest's flight and free flight on the same throw.
-
-    A run that is not whole raises Missing; a rest and bars that miss the whole difference raise ArithmeticError.
-    """
-
-    def read(run: Run) -> float:
-        flight = flights[run].whole
-        if flight.t[-1] < throw.duration:
-            raise Missing(f"{run.name} does not reach the end of the flight")
-        return plateau(flight.t, flight.omega, throw.omega0)
-
-    def value(names: Sequence[str]) -> float:
-        return read(equation_run(throw, mended(start, names)))
-
-    guest_level, end = read(visit.guest.run(throw)), value(differing(start))
-    alike = dict.fromkeys(("forward", "backward", "average", "low", "high"), value(()) - guest_level)
-    alike |= dict.fromkeys(("forward_band", "average_band"), visit.band or 0.0)
-    bars = (Bar(name=f"the rest, to {name_of(start)}", **alike), *bars_of(differing(start), value, lambda _: 0.0))
-    return Waterfall(
-        observable=OBSERVABLES[0],
-        slices=throw.n_slices,
-        start=guest_level,
-        end=end,
-        end_band=0.0,
-        bars=bars,
-        residual=missed_by(bars, guest_level, end),
-        rods=read(rods_run(throw)),
-        solver=visit.guest.label,
-    )
