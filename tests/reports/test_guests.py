@@ -7,19 +7,17 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from flipproof.build import ask_of
 from flipproof.chapters import chapters_named
-from flipproof.chapters.guests.chapter import claims, summarise
-from flipproof.chapters.guests.study import energy_of, placed_on
+from flipproof.chapters.guests.chapter import summarise
+from flipproof.chapters.guests.study import energy_of
 from flipproof.chapters.solvers import SPARSE, facts_of, invited
 from flipproof.cli import main as cli
 from flipproof.foreign import certify as suite
-from flipproof.foreign.contract import Traits
 from flipproof.foreign.specs import content_of, load
 from flipproof.frame.exhibit import drawn
 from flipproof.frame.flights import Call
@@ -146,18 +144,44 @@ def test_the_flight_that_is_shown_is_held_to_the_equation_of_the_guest(tmp_path,
     assert [one.id for one in Reported(mine(tmp_path, "few", body)).failed] == ["guest-naive-rk4-flight"]
 
 
-def test_a_flight_is_held_to_where_the_certificate_places_a_solver_that_declares_nothing(reported):
-    visit, silent = reported.visits[0], SimpleNamespace(traits=Traits(name="silent"))
-    place = SimpleNamespace(facts={"place": {"equation": "eq8", "on_lattice": True}})
-    certificate = SimpleNamespace(results=[SimpleNamespace(observation=place)])
-    rung = solve("eq8", THROW, times=TIMES)
-    slow = replace(rung, omega=rung.omega * np.linspace(1.0, 0.5, len(TIMES)))
-    assert placed_on(visit.guest, certificate, {"eq8": rung}, slow) is None  # what it declares is claimed elsewhere
-    assert placed_on(silent, certificate, {"eq8": rung}, rung) == ("eq8", 0.0)
-    name, off = placed_on(silent, certificate, {"eq8": rung}, slow)
-    for size, failed in ((1e-4, False), (off, True), (np.nan, True)):
-        (claim,) = (c for c in claims([replace(visit, placed=(name, size))]) if c.id == "guest-naive-rk4-flight")
-        assert claim.failed is failed
+@pytest.fixture
+def placed(monkeypatch):
+    """Certificates that place a solver."""
+    monkeypatch.setattr(suite.certify, "__defaults__", (("equation", "gravity"),))
+
+
+@pytest.mark.usefixtures("placed")
+def test_a_flight_is_held_to_where_the_certificate_places_a_solver_that_declares_nothing(tmp_path):
+    silent = "    equation = None\n"
+    right = mine(tmp_path, "right", f"        return super().solve(ask)\n{silent}")
+    found = Reported(right)
+    claim = found.findings["guest-naive-rk4-flight"]
+    assert claim.kind == "regression"
+    assert claim.verdict == "pass"
+    assert "from eq8, the equation on which its certificate places it" in claim.title
+    assert "N = 5" in claim.note
+    assert pickle.loads(pickle.dumps(found.visits))[0].certificate.result.facts["place"]["on_lattice"]
+    (pair,) = (d for d in found.gathered.result("differences").pairs if d.second == "naive RK4")
+    assert (claim.value, claim.band.size) == (pair.largest, pytest.approx(pair.band))
+    body = (
+        "        more = 1.0 if ask.scenario.n_slices < 5 else 2.0  # wrong where there are five slices\n"
+        "        return super().solve(replace(ask, scenario=replace(ask.scenario, drag=more * ask.scenario.drag)))\n"
+    )
+    assert [one.id for one in Reported(mine(tmp_path, "few", body + silent)).failed] == ["guest-naive-rk4-flight"]
+
+
+@pytest.mark.usefixtures("placed")
+def test_a_solver_may_be_placed_beside_the_ladder(tmp_path):
+    file = tmp_path / "beside.py"
+    file.write_text(
+        "from flipproof.foreign.contract import started\nfrom ode_reference import solve as reference\n\n\n"
+        "def solve(ask):\n"
+        "    return reference(started(ask), 'switches:101100', ask.times)\n\n\nsolve.name = 'beside'\n"
+    )
+    claim = Reported(f"{file}:solve").findings["guest-beside-flight"]
+    assert claim.verdict == "pass"
+    assert claim.value < 1e-12
+    assert "switches:101100" in claim.title
 
 
 def test_solvers_of_one_name_are_told_apart(tmp_path):

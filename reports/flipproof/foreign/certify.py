@@ -73,13 +73,17 @@ ENOUGH: Final = "enough"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """The outcome of one check; ``observation`` is None if it gave no numbers, and ``reason`` says why."""
+    """The outcome of one check; ``observation`` is None if it gave no numbers, and ``reason`` says why.
+
+    ``facts`` go into the passport.
+    """
 
     check: str
     verdict: str
     title: str
     observation: Observation | None = None
     reason: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def line(self) -> str:
@@ -125,11 +129,13 @@ class Certificate:
         domain = f"; asked were {domain_text(self.domain)}" if self.domain else ""
         return f"{len(self.results)} checks: {', '.join(parts)}{domain}"
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What the checks found out beside their verdicts, such as the ``place`` among the equations."""
+        return {name: fact for result in self.results for name, fact in result.facts.items()}
+
     def to_mapping(self) -> dict[str, Any]:
         """Return the passport: what the solver says of itself, the results, and the versions they were made with."""
-        facts: dict[str, Any] = {}
-        for result in self.results:
-            facts |= dict(result.observation.facts) if result.observation else {}
         return {
             "passport": 2,
             "solver": asdict(self.traits),
@@ -147,7 +153,7 @@ class Certificate:
                 for r in self.results
             ],
             "domain": {name: list(ends) for name, ends in self.domain.items()},
-            "facts": json_ready(facts),
+            "facts": json_ready(self.facts),
             "conclusion": self.conclusion,
         }
 
@@ -266,10 +272,11 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     except WaitingError as why:
         return result(verdict=WAITING, reason=str(why))
     except NotApplicableError as why:
-        return result(verdict=IDLE, reason=str(why))
+        return result(verdict=IDLE, reason=str(why), facts=why.facts)
     except ForeignError as error:
         message = f"{error}; known: {reason}" if reason else f"{error}{_answered_without(recorder)}"
         return result(verdict=FAILED if reason is None else EXPECTED, reason=message)
+    result = partial(result, facts=observation.facts)
     if observation.holds and reason is not None:
         return result(verdict=FAILED, observation=observation, reason=f"declared as a failure ({reason}), but holds")
     if observation.holds:

@@ -29,7 +29,11 @@ CALM: Final[Mapping[str, Scenario]] = {"weight": replace(SMOOTH, gravity=0.0), "
 
 
 class NotApplicableError(Exception):
-    """A check cannot be made of this solver; the message says what is missing."""
+    """A check cannot be made of this solver; the message says what is missing, ``facts`` what it found all the same."""
+
+    def __init__(self, message: str, facts: Mapping[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.facts = dict(facts or {})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1046,7 +1046,7 @@ def check_equation(traits: Traits) -> CheckGenerator:
     """The solver is nearest to the equation it declares, and no farther from it than its own error explains."""
     place = yield from placing(traits)
     if traits.equation is None:
-        raise NotApplicableError(f"none is declared; {place.text}")
+        raise NotApplicableError(f"none is declared; {place.text}", {"place": place.to_mapping()})
     try:
         declared = name_of(switches_of(traits.equation))
     except ValueError as error:

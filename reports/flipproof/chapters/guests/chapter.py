@@ -8,11 +8,11 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from flipproof.chapters.differences.chapter import claim_flight
 from flipproof.chapters.guests.study import Visit, study
-from flipproof.chapters.solvers import UNREFINED
 from flipproof.figures.style import ASSUMPTIONS, MARKERS, new_figure, shared_legend, styled
 from flipproof.foreign.certify import findings_of
-from flipproof.frame.chapter import Absent, Chapter, Claims, Exhibit, observed, regression
+from flipproof.frame.chapter import Absent, Chapter, Claims, Exhibit, observed
 from flipproof.frame.columns import rows_csv
 
 FLOOR: Final = 1e-12
@@ -30,12 +30,11 @@ def claims(visits: Sequence[Visit]) -> Claims:
             idle = name == "certificate" and guest.curve
             name = name.removeprefix(f"{label}, ").replace(" ", "-")
             yield Absent(f"{head}-{name}-missing", f"{label}: {name}", reason, "observation" if idle else "regression")
-        if visit.placed is not None:
-            rung, deviation = visit.placed
-            room = UNREFINED if visit.band is None else 1e-3 + 5 * visit.band
-            change = "it cannot be refined" if visit.band is None else f"its own change is {visit.band:.2g}"
-            title = f"{label}: largest difference in ω from {rung}, the equation it was placed on"
-            yield regression(f"{head}-flight", title, deviation, "of ω₀", (0.0, room), change)
+        if visit.placed.result is not None:
+            words = "the equation on which its certificate places it"
+            yield claim_flight(visit.placed.result, guest, visit.band, words)
+        elif visit.placed.reason:
+            yield Absent(f"{head}-flight", f"{label}: its flight", visit.placed.reason)
         if visit.rise is not None:
             title = f"{label}: largest rise of the energy between two output times"
             yield observed(f"{head}-energy", title, visit.rise, "of E(0)")

@@ -15,11 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from flipproof.chapters.differences.study import Difference, study_difference
 from flipproof.chapters.solvers import SPARSE, Guest
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.contract import ForeignError
 from flipproof.foreign.solving import opened
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Outcome, Run, Study, attempt
+from flipproof.frame.twins import omega_band_call
 from ode_reference.models import LADDER
 from slicemodel import Trajectory
 from slicemodel.observables import centre_of_mass_velocity
@@ -41,8 +43,7 @@ class Visit:
 
     ``equation`` is the rung that it declares, or the nearest; ``band`` the largest change of omega between its two
     finest efforts, fraction of omega_0; ``rise`` the largest of its energy between two output times, fraction of E(0).
-    ``placed`` is the rung that the certificate places it on, if it declares none, and how far its flight is from that
-    one, fraction of omega_0.
+    ``placed`` compares its flight with the equation on which its certificate places it, if it declares none.
     """
 
     guest: Guest
@@ -51,7 +52,7 @@ class Visit:
     band: float | None
     efforts: Mapping[str, Outcome[Effort]]
     rise: float | None
-    placed: tuple[str, float] | None = None
+    placed: Outcome[Difference]
 
     @property
     def problems(self) -> dict[str, str]:
@@ -79,48 +80,49 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
     efforts = [run for guest in loaded for run in guest.efforts(ask.throw)]
     flights = yield [*calls.values(), *ladder.values(), *flown.values(), *efforts]
     rungs = {rung: run for rung, run in flights.trajectories(ladder).items() if run.ok}
-    visits = []
-    for guest in ask.work:
+    certificates = {guest: attempt(flights.answer, call) for guest, call in calls.items()}
+    equations = {
+        guest: Run(equation, ask.throw, {}, equation)
+        for guest, certificate in certificates.items()
+        if (equation := placed_on(guest, certificate.result)) and flights.trajectory(flown[guest]) is not None
+    }
+    bands = {guest: omega_band_call(run) for guest, run in equations.items()}
+    flights = yield [*equations.values(), *bands.values()]
+
+    def visit(guest: Guest) -> Visit:
         flight = flights.trajectory(flown[guest]) if guest in flown else None
         equation = guest.equation(rungs, flight)
         runs = guest.efforts(ask.throw)
-        certificate: Outcome[Certificate] = Outcome(None, "a curve in a file cannot be asked")
-        if guest in calls:
-            certificate = attempt(flights.answer, calls[guest])
-        visits.append(
-            Visit(
-                guest=guest,
-                certificate=certificate,
-                equation=equation,
-                band=guest.band(ask.throw, flights),
-                efforts={run.name: attempt(effort_of, run, rungs.get(equation), flights) for run in runs},
-                rise=rise_of(flight) if flight is not None and len(flight.v) == len(flight.t) else None,
-                placed=placed_on(guest, certificate.result, rungs, flight),
-            )
+        placed: Outcome[Difference] = Outcome(None)
+        if guest in equations:
+            placed = attempt(study_flight, guest, equations[guest], bands[guest], flights)
+        return Visit(
+            guest=guest,
+            certificate=certificates.get(guest, Outcome(None, "a curve in a file cannot be asked")),
+            equation=equation,
+            band=guest.band(ask.throw, flights),
+            efforts={run.name: attempt(effort_of, run, rungs.get(equation), flights) for run in runs},
+            rise=rise_of(flight) if flight is not None and len(flight.v) == len(flight.t) else None,
+            placed=placed,
         )
-    return tuple(visits)
+
+    return tuple(visit(guest) for guest in ask.work)
 
 
-def placed_on(
-    guest: Guest, certificate: Certificate | None, rungs: Mapping[str, Trajectory], flight: Trajectory | None
-) -> tuple[str, float] | None:
-    """Return the rung that a certificate places an undeclared solver on, and how far its flight is from it."""
-    place = place_in(certificate)
+def placed_on(guest: Guest, certificate: Certificate | None) -> str:
+    """Return the equation on which its certificate places a guest that declares none; empty if there is none."""
+    place = None if certificate is None else certificate.facts.get("place")
     declared = guest.traits is not None and guest.traits.equation is not None
-    if declared or flight is None or place is None or not place["on_lattice"] or place["equation"] not in rungs:
-        return None
-    rung = rungs[place["equation"]]
-    deviation = np.abs(np.interp(flight.t, rung.t, rung.omega) - flight.omega)
-    return str(place["equation"]), float(np.max(deviation) / abs(flight.scenario.omega0))
+    return "" if declared or place is None or not place["on_lattice"] else str(place["equation"])
 
 
-def place_in(certificate: Certificate | None) -> Mapping[str, Any] | None:
-    """Return where a certificate places a solver among the equations, if it does."""
-    results = () if certificate is None else certificate.results
-    places = [
-        r.observation.facts["place"] for r in results if r.observation is not None and "place" in r.observation.facts
-    ]
-    return places[0] if places else None
+def study_flight(guest: Guest, equation: Run, band: Call, flights: Flights) -> Difference:
+    """Compare the flight of a guest with that of an equation, whose own band is answered by ``band``."""
+    throw = equation.scenario
+    known, change = attempt(flights.answer, band).result, guest.band(throw, flights)
+    both = None if known is None or change is None else float(known[-1]) + change
+    name = f"{equation.name} and {guest.label}"
+    return study_difference(name, flights[equation].flight, flights[guest.run(throw)].flight, band=both)
 
 
 def certified(spec: str, timeout: float | None) -> Certificate:
