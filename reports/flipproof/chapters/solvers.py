@@ -63,8 +63,8 @@ def solver_runs(throw: Scenario, steps: int, certified: tuple[str, ...]) -> dict
 
 # ---------------------------------------------------------------------- solvers of other people
 
-LEVELS: Final = (-4, -2, 0, 2)
-"""Levels of refinement at which a guest flies the throw; at the finest it also flies beside all other solvers."""
+LEVELS: Final = (0, 2)
+"""Levels of refinement at which a guest flies the throw; at the finer it also flies beside all other solvers."""
 
 SPARSE: Final = 27
 """Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
@@ -111,8 +111,8 @@ class Guest:
         return [self.run(throw, level, times) for level in LEVELS] if refined else []
 
     def band(self, throw: Scenario, flights: Flights) -> float | None:
-        """Return the largest change of omega between its two finest efforts, fraction of omega_0; None if unknown."""
-        flown = [flights.trajectory(run) for run in self.efforts(throw)[-2:]]
+        """Return the largest change of omega between its efforts, fraction of omega_0; None if unknown."""
+        flown = [flights.trajectory(run) for run in self.efforts(throw)]
         if not flown or flown[0] is None or flown[1] is None:
             return None
         return float(np.max(np.abs(flown[1].omega - flown[0].omega)) / abs(throw.omega0))

@@ -197,10 +197,10 @@ def claim_guest(d: Difference, guest: Guest, change: float | None) -> Iterator[F
 def claim_flight(d: Difference, guest: Guest, change: float | None, words: str) -> Finding:
     """Return the claim that a guest's own error explains how far it is from an equation, which is its own by ``words``.
 
-    ``change`` is that of omega between its two finest efforts, fraction of omega_0; None if it cannot be refined.
+    ``change`` is that of omega between its two efforts, fraction of omega_0; None if it cannot be refined.
     """
     room = UNREFINED if change is None else 1e-3 + 5 * (d.band or 0.0)
-    own = "it cannot be refined" if change is None else f"its own change between its finest efforts is {change:.2g}"
+    own = "it cannot be refined" if change is None else f"its own change between its efforts is {change:.2g}"
     title = f"{d.second}: largest difference in ω from {d.first}, {words}"
     note = f"N = {d.slices}, t = {d.largest_time:.4g} s; {own}"
     band = Band.of(d.band, "twins and refinement")
