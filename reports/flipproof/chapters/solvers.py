@@ -13,7 +13,6 @@ import numpy as np
 from engine_check.certificate import DEFAULT_TOLERANCE
 from engine_check.engines import ENGINES
 from flipproof.foreign.contract import Traits
-from flipproof.foreign.files import File
 from flipproof.foreign.solving import opened
 from flipproof.foreign.specs import content_of, is_foreign
 from flipproof.frame.flights import Flights
@@ -85,7 +84,6 @@ class Guest:
     timeout : float or None - seconds that one run may take; None: as it says
     content : str - SHA-256 of its files
     traits : Traits or None - what it says of itself; None if it cannot be loaded, for the reason ``problem``
-    curve : bool - whether it is a curve in a file, which cannot be asked for another throw
     """
 
     spec: str
@@ -95,7 +93,6 @@ class Guest:
     content: str = ""
     traits: Traits | None = None
     problem: str = ""
-    curve: bool = False
 
     def run(self, throw: Scenario, level: int = LEVELS[-1], times: FloatArray | None = None) -> Run:
         """Return its run of a throw."""
@@ -134,8 +131,8 @@ def invited(specs: Sequence[str], timeout: float | None = None) -> tuple[Guest, 
         name = spec
         try:
             given["content"] = content_of(spec)
-            with closing(opened(spec, timeout, curves=True)) as runner:
-                given |= {"traits": runner.traits, "curve": isinstance(runner, File)}
+            with closing(opened(spec, timeout)) as runner:
+                given["traits"] = runner.traits
                 name = runner.traits.name
         except ValueError as error:
             given["problem"] = str(error)

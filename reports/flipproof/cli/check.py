@@ -73,13 +73,10 @@ def command_diff(options: argparse.Namespace) -> int:
 
 def command_check(options: argparse.Namespace) -> int:
     """Print one line per claim, the verdict first; return 1 if one fails."""
-    from flipproof.foreign.specs import check_asked
     from slicemodel import Scenario
 
     scenario = Scenario.from_toml(options.scenario)
     check_guests(options.guests)
-    for spec in options.guests:
-        check_asked(spec)
     from flipproof.check.throw import groups as known_groups
 
     groups = options.only or tuple(group for group in known_groups() if options.baseline or group != "thresholds")
@@ -171,9 +168,7 @@ def _compares_any_system(options: argparse.Namespace) -> bool:
             missing = next(path for path in paths if not path.is_file())
             raise ValueError(f"{missing} is no file: --columns, --twin, --from-twins, --shift and --plot compare files")
         for path in paths:
-            if (
-                path.suffix in SUFFIXES and ":" not in str(path) and not path.is_file()
-            ):  # nor a solver, such as csv:FILE
+            if path.suffix in SUFFIXES and ":" not in str(path) and not path.is_file():  # nor a solver's spec
                 raise ValueError(f"{path} is no file")
         return False
     if for_files or any(path.suffix in (".parquet", ".npz", ".nc") for path in paths):

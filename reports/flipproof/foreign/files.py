@@ -1,4 +1,4 @@
-"""Solvers that answer by files: an existing curve, any program that reads and writes CSV, and a folder."""
+"""Solvers that answer by files: any program that reads and writes CSV, and a folder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from flipproof.foreign.contract import (
     answer_of,
 )
 from flipproof.foreign.processes import KEPT, ending, last_line
-from flipproof.foreign.specs import split_spec, words_of
+from flipproof.foreign.specs import words_of
 from flipproof.output.files import write_whole
 from slicemodel.scenario import unknown_name
 
@@ -92,27 +92,13 @@ def write_ask(ask: Ask, folder: Path) -> dict[str, str]:
     return paths | {"effort": "" if ask.effort is None else repr(ask.effort)}
 
 
-def answer_in(path: Path, ask: Ask, name: str, *, own_times: bool = False) -> Answer:
+def answer_in(path: Path, ask: Ask, name: str) -> Answer:
     """Return the checked answer of a file; a ForeignError calls the file by ``name``."""
     try:
-        return answer_of(ask, read_answer(path, ask.scenario.n_slices), own_times=own_times)
+        return answer_of(ask, read_answer(path, ask.scenario.n_slices))
     except AnswerError as error:
         message = str(error).replace(str(path), name)
         raise ForeignError(message if name in message else f"{name}: {message}") from None
-
-
-class File(Runner):
-    """A curve in a CSV file. It answers at its own times, whatever the throw."""
-
-    def __init__(self, spec: str) -> None:
-        self.path = Path(split_spec(spec)[1])
-        if not self.path.is_file():
-            raise ValueError(f"solver {spec!r}: there is no file {self.path}")
-        self.traits = Traits(name=self.path.name)
-
-    def __call__(self, ask: Ask) -> Answer:
-        """Return the curve, at its own times."""
-        return answer_in(self.path, ask, str(self.path), own_times=True)
 
 
 PLACEHOLDERS: Final = ("scenario", "times", "start", "effort", "out")

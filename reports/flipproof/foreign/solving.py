@@ -14,18 +14,16 @@ import numpy as np
 
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, answer_of, started, trajectory_of
-from flipproof.foreign.files import File, Folder, traits_of_command
+from flipproof.foreign.files import Folder, traits_of_command
 from flipproof.foreign.isolated import Isolated
 from flipproof.foreign.specs import (
     COMMAND,
+    CSV,
     OBJECT,
-    check_asked,
     check_spec,
     content_of,
-    is_folder,
     is_foreign,
     is_spec,
-    locate,
     split_spec,
 )
 from flipproof.frame import solvers
@@ -77,31 +75,23 @@ def opened(
     spec: str,
     timeout: float | None = None,
     *,
-    curves: bool = False,
     memory: float | None = None,
     given: Mapping[str, Any] = MappingProxyType({}),
 ) -> Runner:
     """Return the solver that a spec names, ready to be asked; raises ValueError if it names nothing.
 
     A run may take ``timeout`` seconds, or what the solver declares, and ``memory`` bytes, or half of the machine's.
-    ``given`` are traits of a program or a folder, which cannot declare them. ``curves`` also admits a curve in a file,
-    which answers one throw at its own times and nothing else.
+    ``given`` are traits of a program or a folder, which cannot declare them.
     """
     kind, body = split_spec(spec)
     if given and kind == OBJECT:
         raise ValueError(f"solver {spec!r}: says itself what it is: {', '.join(given)} cannot be given")
     if not is_foreign(spec):
         return Own(solvers.find(spec))
-    if kind != OBJECT:
-        if kind == COMMAND:
-            return Isolated(spec, timeout, memory, traits_of_command(spec, timeout, given))
-        if is_folder(body):
-            return Folder(Path(body), given)
-        if not curves:
-            check_asked(spec)
-        return File(spec)
-    locate(spec)
-    return Isolated(spec, timeout, memory)
+    check_spec(spec)
+    if kind == CSV:
+        return Folder(Path(body), given)
+    return Isolated(spec, timeout, memory, traits_of_command(spec, timeout, given) if kind == COMMAND else None)
 
 
 _RUNNERS: Final[dict[tuple[str, float | None], tuple[str, Runner]]] = {}
@@ -114,7 +104,7 @@ def _runner(spec: str, content: str, timeout: float | None) -> Runner:
     if key in _RUNNERS and _RUNNERS[key][0] != content:
         _RUNNERS.pop(key)[1].close()
     if key not in _RUNNERS:
-        _RUNNERS[key] = content, opened(spec, timeout, curves=True)
+        _RUNNERS[key] = content, opened(spec, timeout)
     return _RUNNERS[key][1]
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from flipproof.foreign import specs
 from flipproof.foreign.checking import THROW, times_of
-from flipproof.foreign.contract import Ask, ForeignError
+from flipproof.foreign.contract import AnswerError, Ask, ForeignError
+from flipproof.foreign.files import read_answer
 from flipproof.foreign.isolated import BrokenFrameError, receive, send
 from flipproof.foreign.solving import opened
 from flipproof.foreign.specs import is_foreign, is_spec, load, locate
@@ -165,14 +166,6 @@ def test_a_program_that_cannot_answer_says_so(command, said):
         runner(ASK)
 
 
-def test_a_curve_answers_at_its_own_times(tmp_path):
-    file = tmp_path / "curve.csv"
-    file.write_text("t,theta,omega,r_cm\n0,1.5,20,0.2\n0.1,3,15,0.19\n")
-    run = solve(f"csv:{file}", THROW)
-    assert list(run.t) == [0.0, 0.1]
-    assert list(run.omega) == [20.0, 15.0]
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -190,8 +183,8 @@ def test_a_curve_answers_at_its_own_times(tmp_path):
 def test_a_curve_that_could_be_misread_is_refused(tmp_path, text, said):
     file = tmp_path / "curve.csv"
     file.write_text(text)
-    with pytest.raises(ForeignError) as caught:
-        opened(f"csv:{file}", curves=True)(Ask.of(THROW.with_slices(3), np.array([0.0])))
+    with pytest.raises(AnswerError) as caught:
+        read_answer(file, 3)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -199,9 +192,9 @@ def test_a_curve_that_could_be_misread_is_refused(tmp_path, text, said):
 def test_slices_of_a_curve_are_read_in_any_order_of_columns(tmp_path):
     file = tmp_path / "curve.csv"
     file.write_text("r_1,t,v_2,theta,r_0,omega,v_0,r_2,v_1\n.2,0,6,1,.1,2,4,.3,5\n")
-    answer = opened(f"csv:{file}", curves=True)(Ask.of(THROW.with_slices(3), np.array([0.0])))
-    assert answer.r.tolist() == [[0.1, 0.2, 0.3]]
-    assert answer.v.tolist() == [[4.0, 5.0, 6.0]]
+    columns = read_answer(file, 3)
+    assert columns["r"].tolist() == [[0.1, 0.2, 0.3]]
+    assert columns["v"].tolist() == [[4.0, 5.0, 6.0]]
 
 
 def test_a_run_of_a_foreign_solver_is_a_run(tmp_path):

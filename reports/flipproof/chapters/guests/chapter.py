@@ -19,9 +19,8 @@ def claims(visits: Sequence[Visit]) -> Claims:
         if visit.certificate.result is not None:
             yield from findings_of(visit.certificate.result, f"{head}-certify-", f"{label}: ")
         for name, reason in visit.problems.items():
-            idle = name == "certificate" and guest.curve
             name = name.removeprefix(f"{label}, ").replace(" ", "-")
-            yield Absent(f"{head}-{name}-missing", f"{label}: {name}", reason, "observation" if idle else "regression")
+            yield Absent(f"{head}-{name}-missing", f"{label}: {name}", reason)
         if visit.placed.result is not None:
             words = "the equation on which its certificate places it"
             yield claim_flight(visit.placed.result, guest, visit.change, words)

@@ -39,7 +39,7 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
     A call made anew is never answered from the store: whether somebody else's code changed is not known.
     """
     loaded = [guest for guest in ask.work if guest.traits is not None]
-    calls = {g: Call(certified, (g.spec, g.timeout), f"guest {g.label}", anew=True) for g in loaded if not g.curve}
+    calls = {g: Call(certified, (g.spec, g.timeout), f"guest {g.label}", anew=True) for g in loaded}
     flown = {guest: guest.run(ask.throw) for guest in loaded}
     efforts = [run for guest in loaded for run in guest.efforts(ask.throw)]
     flights = yield [*calls.values(), *flown.values(), *efforts]
@@ -53,7 +53,7 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
     flights = yield [*equations.values(), *bands.values()]
 
     def visit(guest: Guest) -> Visit:
-        certificate = certificates.get(guest, Outcome(None, "a curve in a file cannot be asked" if guest.curve else ""))
+        certificate = certificates.get(guest, Outcome(None))
         reasons = {"solver": guest.problem, "certificate": certificate.reason}
         reasons |= {run.name: flights[run].reason for run in guest.efforts(ask.throw)}
         placed: Outcome[Difference] = Outcome(None)
