@@ -19,7 +19,6 @@ from flipproof.foreign.likeness.mistakes import naming
 from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
-from slicemodel import Scenario
 from slicemodel.scenario import known_name, unknown_name
 
 PASSED: Final = "passed"
@@ -194,8 +193,6 @@ class _Recorder(Runner):
     def __init__(self, runner: Runner) -> None:
         self.runner, self.traits = runner, runner.traits
         self.answers: dict[tuple[Any, ...], Answer] = {}
-        self.unanswered: Ask | None = None
-        self.explained = False
         self.named: tuple[str, bool] | None = None
         self.domain: dict[str, tuple[float, float]] = {}
 
@@ -207,11 +204,7 @@ class _Recorder(Runner):
 
     def ask_again(self, ask: Ask) -> Answer:
         """Ask, even if the same was asked before, and return the answer."""
-        try:
-            answer = self.runner(ask)
-        except ForeignError:
-            self.unanswered = ask
-            raise
+        answer = self.runner(ask)
         for name, (_, value) in VARIED.items():
             values = np.append(value(ask), self.domain.get(name, ())) + 0.0  # a sticky throw's e is -0.0
             self.domain[name] = float(values.min()), float(values.max())
@@ -247,9 +240,7 @@ def certify(
         result = _result(name, suite[name], traits, recorder)
         if result.verdict == FAILED and result.observation is None:
             earlier_checks = [
-                earlier.check
-                for earlier in results
-                if earlier.observation is None and earlier.reason.startswith(result.reason)
+                earlier.check for earlier in results if earlier.observation is None and earlier.reason == result.reason
             ]
             result = replace(result, reason=f"as in {earlier_checks[0]}") if earlier_checks else result
         results.append(result)
@@ -274,7 +265,7 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     except NotApplicableError as why:
         return result(verdict=IDLE, reason=str(why), facts=why.facts)
     except ForeignError as error:
-        message = f"{error}; known: {reason}" if reason else f"{error}{_answered_without(recorder)}"
+        message = f"{error}; known: {reason}" if reason else str(error)
         return result(verdict=FAILED if reason is None else EXPECTED, reason=message)
     result = partial(result, facts=observation.facts)
     if observation.holds and reason is not None:
@@ -300,58 +291,6 @@ def _named(traits: Traits, recorder: _Recorder) -> tuple[str, bool]:
         with suppress(WaitingError):  # nobody is asked to write more answers for an advice
             recorder.named = drive(naming(traits), recorder)
     return recorder.named
-
-
-def _answered_without(recorder: _Recorder) -> str:
-    """Return which of rests, weight, drag or impacts must be left out for the failed ask to be answered, and advice.
-
-    Done once per solver, and only if it answers a throw without any of them.
-    """
-    ask, recorder.unanswered = recorder.unanswered, None
-    if ask is None or recorder.explained or ask.scenario.frozen:
-        return ""
-    recorder.explained = True
-    throw = ask.scenario
-    share = min(1.0, 1.0 / (abs(throw.omega0) * throw.duration))  # a radian, before most impacts
-    shortened = replace(ask, scenario=replace(throw, duration=share * throw.duration), times=share * ask.times)
-    bare = replace(shortened, scenario=replace(shortened.scenario, gravity=0.0, drag=0.0))
-
-    def answered(variant: Ask) -> bool:
-        try:
-            recorder(variant)
-        except WaitingError:
-            raise
-        except ForeignError:
-            return False
-        return True
-
-    def restless(throw: Scenario) -> Ask:
-        return replace(ask, scenario=replace(throw, restitution=1.0), start=elsewhere.far_from_ends(throw))
-
-    condition = ""
-    names: tuple[str, ...] = ()
-    with suppress(WaitingError):
-        if not answered(bare):
-            if answered(replace(bare, start=elsewhere.far_from_ends(throw))):
-                condition, names = "with every slice far from the ends", ("rests",)
-            return _look_at(condition, names)
-        others = {"weight": replace(throw, gravity=0.0), "drag": replace(throw, drag=0.0)}
-        name = next((name for name, other in others.items() if answered(replace(ask, scenario=other))), "")
-        without = name and f"without {name}, and with it "
-        if answered(restless(throw if name else replace(throw, gravity=0.0, drag=0.0))):
-            # An elastic impact is another one, too: what the weight or the drag lets begin may be either.
-            condition, names = f"{without}as long as no slice rests", ("rests", "impacts") if name else ("rests",)
-        elif answered(shortened):
-            condition, names = f"{without}up to the first impact", ("impacts", name) if name else ("impacts",)
-        elif name:
-            condition, names = f"without {name}", (name,)
-    return _look_at(condition, names)
-
-
-def _look_at(condition: str, names: tuple[str, ...]) -> str:
-    """Return under what condition an ask is answered, and what to look at; empty if none is known."""
-    parts = ", or at ".join(elsewhere.LOOK_AT[name] for name in names)
-    return parts and f"; the same is answered {condition}: look at {parts}"
 
 
 def _coverage(results: Iterable[Result]) -> Result:

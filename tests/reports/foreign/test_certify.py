@@ -980,28 +980,6 @@ def test_one_throw_tells_where_the_mistake_is(mistake, piece, words):
     assert words in " / ".join(drive(departing(runner.traits, equation, [PIECES[piece].ask(0)]), runner))
 
 
-def test_what_is_answered_far_from_the_ends_alone_points_to_rests():
-    class Stuck(Subject):
-        def solve(self, ask):
-            if np.max(ask.start) > 0.9 * ask.scenario.bottle.length:
-                raise ForeignError("the step became too small")
-            return super().solve(ask)
-
-    (shape,) = certify(InProcess(Stuck(), "x"), ["shape"]).results
-    assert "the same is answered with every slice far from the ends: look at rests" in shape.line
-
-
-def test_a_rest_that_weight_spoils_is_no_matter_of_the_weight():
-    class Chattering(Subject):
-        def solve(self, ask):
-            if ask.scenario.gravity and ask.scenario.restitution < 1.0:
-                raise ForeignError("the step became too small")
-            return super().solve(ask)
-
-    (shape,) = certify(InProcess(Chattering(), "x"), ["shape"]).results
-    assert "answered without weight, and with it as long as no slice rests: look at rests" in shape.line
-
-
 @pytest.mark.parametrize(
     ("name", "check"),
     [("dop853_between_events", "refinement"), ("dormand_prince_capped", "refinement"), ("single_precision", "ice")],
