@@ -118,15 +118,15 @@ def test_a_program_answers_by_files(tmp_path):
         ("pass", "ended without writing {out}"),
         ("import time; time.sleep(100)", "no answer within 1 s; the process was ended"),
         ("import os; os.abort()", "was ended by SIGABRT"),
-        ("import sys; open(sys.argv[1], 'w').write('')", "has no header"),
+        ("import sys; open(sys.argv[1], 'w').write('')", "out}: is empty"),
         ("import sys; open(sys.argv[1], 'w').write('t,theta\\n0,1\\n')", "omega missing"),
-        ("import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1\\n')", "line 2 has 2 cells, the header 3"),
-        ("import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1,x\\n')", "column omega: could not convert"),
+        ("import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1\\n')", "line 2 has 2 cells, the header has 3"),
+        ("import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1,x\\n')", "column omega: 'x' is not a number"),
         (
             "import sys; open(sys.argv[1], 'w').write('t;theta;omega\\n0;1;2\\n')",
-            "{out} separates its columns by semicolons",
+            "{out}: it has semicolons",
         ),
-        ("import sys; open(sys.argv[1], 'w').write('t\\ttheta\\tomega\\n')", "{out} separates its columns by tabs"),
+        ("import sys; open(sys.argv[1], 'w').write('t\\ttheta\\tomega\\n')", "{out}: it has tabs"),
         (
             "import sys; open(sys.argv[1], 'w').write('t,theta,omega\\n0,1,1,0,2,0\\n')",
             "line 2 has 6 cells.*decimal comma",
@@ -176,8 +176,8 @@ def test_a_program_that_cannot_answer_says_so(command, said):
         ("t,theta,omega,v_0,v_1\n0,1,2,3,4\n", "2 columns from v_0 to v_1; a throw of 3 slices needs v_0 to v_2"),
         ("t,theta,omega,r_1,r_2,r_3\n0,1,2,3,4,5\n", "3 columns from r_1 to r_3; a throw of 3 slices needs r_0 to r_2"),
         ("t,theta,omega,theta\n0,1,2,3\n", "names the column 'theta' twice"),
-        ("t,theta,omega\n0,1,2\n\n\n0.1,1,x\n", "line 5, column omega: could not convert string to float: 'x'"),
-        ("t,theta,omega\n\n0,1,2\n\n0.1,1\n", "line 5 has 2 cells, the header 3"),
+        ("t,theta,omega\n0,1,2\n\n\n0.1,1,x\n", "line 5, column omega: 'x' is not a number"),
+        ("t,theta,omega\n\n0,1,2\n\n0.1,1\n", "line 5 has 2 cells, the header has 3"),
     ],
 )
 def test_a_curve_that_could_be_misread_is_refused(tmp_path, text, said):
