@@ -51,22 +51,20 @@ class Ask:
     start : array, shape (N,) - positions of the slices at release, from the cap [m], in any order, not only those of
         ``scenario.initial_positions()``; the slices are at rest in the bottle
     effort : float or None - the number that ``Traits.refined_by`` names; None if it names nothing
-    options : mapping - what the user gave the solver by name
     """
 
     scenario: Scenario
     times: FloatArray
     start: FloatArray
     effort: float | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, scenario: Scenario, times: FloatArray, effort: float | None = None, **options: Any) -> Ask:
+    def of(cls, scenario: Scenario, times: FloatArray, effort: float | None = None) -> Ask:
         """Return the ask for a throw from the start of Eq. 3a, every slice at rest in the water on the base."""
         start = scenario.initial_positions()
         for array in (times, start):
             array.setflags(write=False)
-        return cls(scenario=scenario, times=times, start=start, effort=effort, options=MappingProxyType(options))
+        return cls(scenario=scenario, times=times, start=start, effort=effort)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -369,7 +367,7 @@ def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Tr
         v=v,
         r_cm=r_cm,
         inertia=inertia,
-        settings={"spec": name, "effort": ask.effort, **ask.options},
+        settings={"spec": name, "effort": ask.effort},
         diagnostics={"not_given": [field for field in PER_TIME if getattr(answer, field) is None], **diagnostics},
     )
 

@@ -176,7 +176,7 @@ class Folder(Runner):
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the answer beside a question; add the question if it is new."""
-        text = json.dumps([ask.scenario.to_mapping(), ask.effort, dict(ask.options)], sort_keys=True).encode()
+        text = json.dumps([ask.scenario.to_mapping(), ask.effort], sort_keys=True).encode()
         key = hashlib.sha256(text + ask.times.tobytes() + ask.start.tobytes()).hexdigest()[:12]
         question = next(iter(self.folder.glob(f"[0-9]*-{key}")), None)
         if question is None:

@@ -44,7 +44,6 @@ def solve(
     level: float = 0,
     timeout: float | None = None,
     label: str = "",
-    **options: Any,
 ) -> Trajectory:
     """Run the solver that a spec names, in a process of its own that is kept for the next run.
 
@@ -57,11 +56,10 @@ def solve(
     level : float - refinement: 0 is a thousandth of the flight, each level halves the step
     timeout : float, optional - seconds that the run may take, instead of what the solver declares
     label : str - the method's name, instead of the solver's
-    options : passed to the solver by name
     """
     runner = _runner(spec, content_of(spec), timeout)
     given = effort_of(runner.traits, scenario, level) if effort is None else effort
-    ask = Ask.of(scenario, output_times(scenario, times), given, **options)
+    ask = Ask.of(scenario, output_times(scenario, times), given)
     began = time.perf_counter()
     try:
         answer = runner(ask)
@@ -131,7 +129,7 @@ class Own(Runner):
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer; the slice model computes on a uniform grid that holds the asked times."""
-        settings: dict[str, Any] = dict(ask.options)
+        settings: dict[str, Any] = {}
         grid: FloatArray | None = None
         if self.solver.package == "slicemodel":
             settings["steps"] = _points_of(ask)

@@ -12,18 +12,16 @@ from flipproof.output.tables import Curve, trajectory_csv
 from slicemodel import Scenario, Trajectory, solve
 from slicemodel.observables import centre_of_mass, moment_of_inertia
 
-ASK = Ask.of(THROW, times_of(THROW, 5), 0.01, colour="blue")
+ASK = Ask.of(THROW, times_of(THROW, 5), 0.01)
 CURVE = {"t": ASK.times, "theta": ASK.times, "omega": 1.0 + ASK.times}
 R = np.tile(ASK.start, (5, 1))
 
 
 def test_an_ask_starts_at_rest_in_the_water_and_cannot_be_written():
     np.testing.assert_array_equal(ASK.start, THROW.initial_positions())
-    assert (ASK.effort, ASK.options["colour"]) == (0.01, "blue")
+    assert ASK.effort == 0.01
     with pytest.raises(ValueError, match="read-only"):
         ASK.times[0] = 1.0
-    with pytest.raises(TypeError):
-        ASK.options["colour"] = "red"
 
 
 @pytest.mark.parametrize(
