@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flipproof.foreign.checking import WRAPPED, whole_turns
 from flipproof.foreign.interval import FIELDS, FLOOR, Interval
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass
@@ -34,8 +35,8 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
         return "its slices do not move: look at what is taken for ice"
     if held := _held(intervals):
         return held
-    if np.mean([_whole_turns(i) for i in intervals]) > 0.5:
-        return "theta is off by whole turns: do not wrap it"
+    if np.mean([whole_turns(i.theta[1] - i.expected["theta"], 1e-4) for i in intervals]) > 0.5:
+        return WRAPPED
     # Answers may be arbitrary; no cause can be found for numbers that overflow.
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
         if cause := _angle_cause(intervals) or time_cause(intervals):
@@ -52,12 +53,6 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
             or (STALE_OMEGA if np.median([i.departure["omega"] for i in intervals]) > OFF_MOMENTUM else "")
         )
     return ""
-
-
-def _whole_turns(interval: Interval) -> bool:
-    """Return whether theta alone is off, by a whole number of turns."""
-    turns = float(interval.theta[1] - interval.expected["theta"]) / (2 * np.pi)
-    return bool(round(turns) and abs(turns - round(turns)) < 1e-4)
 
 
 def _held(intervals: Sequence[Interval]) -> str:

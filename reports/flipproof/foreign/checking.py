@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, WaitingError
 from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
@@ -98,6 +99,17 @@ def refined_words(traits: Traits) -> str:
 def shift(first: Answer, second: Answer, scale: float) -> float:
     """Return the largest difference of two curves omega(t), as a fraction of ``scale``."""
     return float(np.max(np.abs(first.omega - second.omega)) / abs(scale))
+
+
+WRAPPED: Final = "theta is off by whole turns: do not wrap it"
+"""What to do if ``whole_turns`` holds."""
+
+
+def whole_turns(difference: ArrayLike, room: float) -> bool:
+    """Return whether an angle [rad] is off by whole turns, within ``room`` turns, at one time or more."""
+    turns = np.asarray(difference) / (2 * np.pi)
+    whole = np.rint(turns)
+    return bool(np.any(whole)) and float(np.max(np.abs(turns - whole))) <= room
 
 
 def decimals_of(fields: Collection[FloatArray], candidates: Iterable[int]) -> int | None:
