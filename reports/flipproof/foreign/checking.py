@@ -112,6 +112,19 @@ def whole_turns(difference: ArrayLike, room: float) -> bool:
     return bool(np.any(whole)) and float(np.max(np.abs(turns - whole))) <= room
 
 
+def scales(throw: Scenario, inertia: ArrayLike = ()) -> dict[str, float]:
+    """Return the scale of each field, for relative differences; of the inertia it is the largest value."""
+    spin, length = abs(throw.omega0), throw.bottle.length
+    return {
+        "omega": spin,
+        "theta": max(1.0, spin * throw.duration),
+        "r": length,
+        "r_cm": length,
+        "inertia": float(np.max(inertia, initial=0.0)) or 1.0,
+        "v": length * spin,
+    }
+
+
 def decimals_of(fields: Collection[FloatArray], candidates: Iterable[int]) -> int | None:
     """Return the first of some numbers of decimals with which all fields are printed exactly; None: with none."""
     return next((d for d in candidates if all(np.array_equal(np.round(values, d), values) for values in fields)), None)

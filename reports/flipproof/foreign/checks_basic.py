@@ -24,6 +24,7 @@ from flipproof.foreign.checking import (
     ask_of,
     decimals_of,
     refined_words,
+    scales,
     shift,
     time_of_max,
     times_of,
@@ -623,7 +624,7 @@ def _defined(answer: Answer) -> tuple[dict[str, FloatArray], dict[str, FloatArra
     """Return r_cm and inertia that follow from r, and by how much those of an answer differ, as fractions."""
     assert answer.r is not None
     derived = {"r_cm": centre_of_mass(THROW, answer.r), "inertia": moment_of_inertia(THROW, answer.r)}
-    scale = {"r_cm": THROW.bottle.length, "inertia": float(np.max(derived["inertia"]))}
+    scale = scales(THROW, derived["inertia"])
     return derived, {name: np.abs(getattr(answer, name) - derived[name]) / scale[name] for name in derived}
 
 
@@ -1002,8 +1003,7 @@ STEP_OF_PROGRAM: Final[Mapping[str, str]] = {
 def _leaves_program(traits: Traits, answer: Answer) -> str:
     """Return at which step and in what a solver leaves the program that it declares, and what to look at."""
     program = solve(str(traits.equation), THROW, steps=len(answer.t))
-    size = {"r": THROW.bottle.length, "v": abs(THROW.omega0) * THROW.bottle.length, "omega": abs(THROW.omega0)}
-    size |= {"r_cm": THROW.bottle.length, "inertia": float(program.inertia[0]), "theta": 1.0}
+    size = scales(THROW, program.inertia[:1]) | {"theta": 1.0}
     for k, name in product(range(len(answer.t)), STEP_OF_PROGRAM):
         if name not in answer.given:
             continue
