@@ -599,15 +599,6 @@ def test_water_moves_in_every_throw():
                 assert len(flown.impacts.time) < 110 + 2 * knobs.slices
 
 
-def test_the_reference_begins_where_it_is_asked_to():
-    """By the reduced flow and, all 2N + 1 equations at once, by ``solve_ivp``."""
-    for knobs in drawn(3)[:3]:
-        ask = replace(knobs, angle=2.0).ask(3)
-        one, other = (ode_reference.solve(started(ask), "eq8", ask.times, method=m) for m in ("taylor", "DOP853"))
-        np.testing.assert_allclose(one.r, other.r, atol=1e-6 * ask.scenario.bottle.length)
-        np.testing.assert_allclose(one.omega, other.omega, rtol=1e-6)
-
-
 def test_a_full_bottle_need_not_begin_as_its_own_mirror_image():
     ask = replace(PAPER, filling=1.0, start="scattered", gravity=0.0, angle=3.0).ask(0)
     one, other = (ode_reference.solve(started(ask), "free-flight", ask.times, method=m) for m in ("taylor", "DOP853"))
