@@ -343,7 +343,7 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
     return Impacts(**arrays | speeds)  # type: ignore[arg-type]
 
 
-def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Trajectory:
+def trajectory_of(ask: Ask, answer: Answer, name: str) -> Trajectory:
     """Return an answer as a Trajectory of method ``name``, for comparison with every other solver.
 
     ``diagnostics["not_given"]`` names what the solver did not give: inertia then follows from the conserved angular
@@ -368,7 +368,7 @@ def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Tr
         r_cm=r_cm,
         inertia=inertia,
         settings={"spec": name, "effort": ask.effort},
-        diagnostics={"not_given": [field for field in PER_TIME if getattr(answer, field) is None], **diagnostics},
+        diagnostics={"not_given": [field for field in PER_TIME if getattr(answer, field) is None]},
     )
 
 

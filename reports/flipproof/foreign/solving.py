@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import math
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -47,7 +46,7 @@ def solve(
 ) -> Trajectory:
     """Run the solver that a spec names, in a process of its own that is kept for the next run.
 
-    ``diagnostics["seconds"]`` is how long it took to answer. Raises ForeignError if it gives no answer.
+    Raises ForeignError if it gives no answer.
 
     Parameters
     ----------
@@ -60,13 +59,11 @@ def solve(
     runner = _runner(spec, content_of(spec), timeout)
     given = effort_of(runner.traits, scenario, level) if effort is None else effort
     ask = Ask.of(scenario, output_times(scenario, times), given)
-    began = time.perf_counter()
     try:
         answer = runner(ask)
     except ForeignError as error:
         raise type(error)(f"{spec}: {error}") from None
-    seconds = time.perf_counter() - began
-    return trajectory_of(ask, answer, label or runner.traits.name, seconds=seconds)
+    return trajectory_of(ask, answer, label or runner.traits.name)
 
 
 def opened(
