@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+import ode_reference
 from flipproof.chapters import chapters_named
 from flipproof.chapters.maps.study import read_flight, study_readings
 from flipproof.cli import main as cli
 from flipproof.figures.style import Drawing
+from flipproof.foreign.contract import started
 from flipproof.frame.flights import Flights
 from flipproof.frame.gather import Gathered, evaluate, gather
 from flipproof.frame.pool import SerialExecutor, make_each
@@ -93,6 +95,25 @@ def is_number(cell):
     except ValueError:
         return False
     return True
+
+
+class Exact:
+    """The reference as somebody's solver; a subclass throws another scenario than is asked, or spoils the answer."""
+
+    equation = "eq8"
+    refined_by = "dt"
+
+    def thrown(self, throw):
+        return throw
+
+    def spoilt(self, _throw, answer):
+        return answer
+
+    def solve(self, ask):
+        throw = started(ask)
+        flight = ode_reference.solve(self.thrown(throw), self.equation, ask.times)
+        names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
+        return self.spoilt(throw, {name: getattr(flight, name).copy() for name in names})
 
 
 class Answers(Executor):

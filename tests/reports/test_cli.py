@@ -128,18 +128,19 @@ def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, wor
 
 
 def test_no_command_writes_over_what_it_reads(capsys, tmp_path):
-    throw, curve = tmp_path / "throw.toml", tmp_path / "curve.csv"
+    throw, curve, mine = tmp_path / "throw.toml", tmp_path / "curve.csv", tmp_path / "mine.py"
     throw.write_text("[scenario]\nn_slices = 3\n")
     curve.write_text("t,omega\n0,20\n0.1,10\n")
+    mine.write_text("def solve(ask): ...\n")
     link = tmp_path / "link.csv"
     link.symlink_to(curve)
     report = tmp_path / "report"
     report.mkdir()
     (report / "summary.json").write_text("{}")
-    before = throw.read_text(), curve.read_text()
+    before = [file.read_text() for file in (throw, curve, mine)]
     for option, arguments in (
         ("--out", ("simulate", throw, "--out", throw)),
-        ("--out", ("simulate", "--solver", f"csv:{curve}", "--out", curve)),
+        ("--out", ("simulate", "--solver", f"{mine}:solve", "--out", mine)),
         ("--json", ("compare", curve, "eq8", "--json", link)),
         ("--json", ("check", throw, "--only", "ice", "--json", throw)),
         ("--out", ("export", throw, "--solver", "eq8", "--out", throw)),
@@ -147,7 +148,7 @@ def test_no_command_writes_over_what_it_reads(capsys, tmp_path):
         ("--json", ("check", throw, "--baseline", report, "--json", report / "summary.json")),
     ):
         refused(capsys, (f"error: {option} ", " is a file that this command reads; name another"), *arguments)
-    assert (throw.read_text(), curve.read_text()) == before
+    assert [file.read_text() for file in (throw, curve, mine)] == before
     assert (report / "summary.json").read_text() == "{}"
 
 

@@ -164,6 +164,7 @@ def test_a_latin_hypercube_reaches_every_kind_of_field():
         ('name = "eq8"', "rtol = 1e-9", ["[[solvers]] 2 lacks a name"]),
         ('name = "eq8"', 'name = "eq8"\nrtoll = 1.0', ["2 (eq8) key 'rtoll' is unknown", "'rtol'?"]),
         ('name = "eq8"', 'name = "eq8"\nsteps = 5', ["2 (eq8) key 'steps' is unknown"]),
+        ('name = "eq8"', 'name = "math:sqrt"\nefort = 1.0', ["2 (math:sqrt) key 'efort' is unknown", "'effort'?"]),
         ('name = "eq8"', 'name = "eq8"\ntimes = [0.0, 0.1]', ["2 (eq8) times belongs to one throw", "curves = 101"]),
         ('name = "eq8"', 'name = "eq8"\nspeeds = [1.0]', ["2 (eq8) speeds belongs to one throw"]),
         ('name = "eq8"', 'name = "eq8"\nrtol = inf', ["rtol = inf is not a finite number"]),

@@ -37,6 +37,8 @@ def test_a_summary_has_no_slices():
         ("t,theta,omega,r_cm\n0,0,0,0\n1,0,x,0\n", "line 3, column omega: 'x' is not a number"),
         ("t,theta,omega,r_cm\n0,0,0,0\n1,nan,0,0\n", "line 3, column theta: nan is not finite"),
         ("t,theta,omega,r_cm\n0,0,0,0\n1,0,0\n", "line 3 has 3 cells, the header has 4"),
+        ("t,omega\n0,5,1,5\n", r"line 2 has 4 cells, the header has 2 \(a decimal comma\? numbers need points\)"),
+        ('t,omega\n0,1\n1,"0,5"\n', "line 3, column omega: '0,5' is not a number; a decimal comma?"),
         ("t,theta,omega,r_cm\n1,0,0,0\n0.5,0,0,0\n", "line 3: t = 0.5 s follows t = 1 s"),
     ],
 )

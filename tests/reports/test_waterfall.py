@@ -100,6 +100,12 @@ def test_every_split_of_every_observable_sums_to_the_whole():
         assert part.largest.name in {bar.name for bar in part.bars}
 
 
+def test_bars_that_miss_the_whole_are_a_mistake_of_the_program(monkeypatch):
+    monkeypatch.setattr(waterfall, "mean", lambda changes: 0.9 * changes[0][1])
+    with pytest.raises(ArithmeticError, match="the bars miss"):
+        split(lambda s: 1.0 if s.signs else 0.0)
+
+
 def test_overlap_stands_in_the_margin_and_takes_no_part_in_the_split():
     """Rods are a made-up 5 in every observable of the waterfall, whatever free flight is."""
     plateau = split(lambda s: 1.0 if s.recoil else 0.0)[0]

@@ -13,7 +13,6 @@ import numpy as np
 from engine_check.certificate import DEFAULT_TOLERANCE
 from engine_check.engines import ENGINES
 from flipproof.foreign.contract import Traits
-from flipproof.foreign.files import File
 from flipproof.foreign.solving import opened
 from flipproof.foreign.specs import content_of, is_foreign
 from flipproof.frame.flights import Flights
@@ -63,8 +62,8 @@ def solver_runs(throw: Scenario, steps: int, certified: tuple[str, ...]) -> dict
 
 # ---------------------------------------------------------------------- solvers of other people
 
-LEVELS: Final = (-4, -2, 0, 2)
-"""Levels of refinement at which a guest flies the throw; at the finest it also flies beside all other solvers."""
+LEVELS: Final = (0, 2)
+"""Levels of refinement at which a guest flies the throw; at the finer it also flies beside all other solvers."""
 
 SPARSE: Final = 27
 """Every so many output times are asked for at ``LEVELS``: a solver makes at least one step from each to the next."""
@@ -85,7 +84,6 @@ class Guest:
     timeout : float or None - seconds that one run may take; None: as it says
     content : str - SHA-256 of its files
     traits : Traits or None - what it says of itself; None if it cannot be loaded, for the reason ``problem``
-    curve : bool - whether it is a curve in a file, which cannot be asked for another throw
     """
 
     spec: str
@@ -95,7 +93,6 @@ class Guest:
     content: str = ""
     traits: Traits | None = None
     problem: str = ""
-    curve: bool = False
 
     def run(self, throw: Scenario, level: int = LEVELS[-1], times: FloatArray | None = None) -> Run:
         """Return its run of a throw."""
@@ -111,8 +108,8 @@ class Guest:
         return [self.run(throw, level, times) for level in LEVELS] if refined else []
 
     def band(self, throw: Scenario, flights: Flights) -> float | None:
-        """Return the largest change of omega between its two finest efforts, fraction of omega_0; None if unknown."""
-        flown = [flights.trajectory(run) for run in self.efforts(throw)[-2:]]
+        """Return the largest change of omega between its efforts, fraction of omega_0; None if unknown."""
+        flown = [flights.trajectory(run) for run in self.efforts(throw)]
         if not flown or flown[0] is None or flown[1] is None:
             return None
         return float(np.max(np.abs(flown[1].omega - flown[0].omega)) / abs(throw.omega0))
@@ -134,8 +131,8 @@ def invited(specs: Sequence[str], timeout: float | None = None) -> tuple[Guest, 
         name = spec
         try:
             given["content"] = content_of(spec)
-            with closing(opened(spec, timeout, curves=True)) as runner:
-                given |= {"traits": runner.traits, "curve": isinstance(runner, File)}
+            with closing(opened(spec, timeout)) as runner:
+                given["traits"] = runner.traits
                 name = runner.traits.name
         except ValueError as error:
             given["problem"] = str(error)

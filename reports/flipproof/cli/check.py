@@ -77,13 +77,10 @@ def command_diff(options: argparse.Namespace) -> int:
 
 def command_check(options: argparse.Namespace) -> int:
     """Print one line per claim, the verdict first; return 1 if one fails."""
-    from flipproof.foreign.specs import check_asked
     from slicemodel import Scenario
 
     scenario = Scenario.from_toml(options.scenario)
     check_guests(options.guests)
-    for spec in options.guests:
-        check_asked(spec)
     from flipproof.check.throw import groups as known_groups
 
     groups = options.only or tuple(group for group in known_groups() if options.baseline or group != "thresholds")
@@ -160,7 +157,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 
 def _names_file(path: Path) -> bool:
-    """Return whether a name is that of a file, there or not; what has a colon is a solver's, such as csv:FILE."""
+    """Return whether a name is that of a file, there or not; what has a colon is a solver's spec."""
     return path.is_file() or ((path.suffix != "" or len(path.parts) > 1) and ":" not in str(path))
 
 

@@ -16,7 +16,6 @@ from typing import Final
 import numpy as np
 
 from flipproof.film.kernel.scoring import curve_at
-from flipproof.frame.others import OTHERS
 from flipproof.frame.solvers import catalogue, find, solve
 from ode_reference.solver import WATERS
 from slicemodel import Scenario
@@ -158,14 +157,10 @@ class Equation:
 
 def package_of(solver: str) -> str:
     """Return the package of a solver that can be fitted; engines, curves in files and unknown names are refused."""
-    from flipproof.foreign.specs import check_asked
-
     package = find(solver).package
     if package == "engine_check":
         others = [name for name, other in catalogue().items() if other.package != package]
         raise ValueError(
             f"model = {solver!r} is a physics engine, too slow to fit with; choose from {', '.join(others)}"
         )
-    if package in OTHERS:
-        check_asked(solver)
     return package

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flipproof.foreign.checking import WRAPPED, whole_turns
 from flipproof.foreign.interval import FIELDS, FLOOR, Interval
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass
@@ -34,8 +35,8 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
         return "its slices do not move: look at what is taken for ice"
     if held := _held(intervals):
         return held
-    if np.mean([_whole_turns(i) for i in intervals]) > 0.5:
-        return "theta is off by whole turns: do not wrap it"
+    if np.mean([whole_turns(i.theta[1] - i.expected["theta"], 1e-4) for i in intervals]) > 0.5:
+        return WRAPPED
     # Answers may be arbitrary; no cause can be found for numbers that overflow.
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
         if cause := _angle_cause(intervals) or time_cause(intervals):
@@ -52,12 +53,6 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
             or (STALE_OMEGA if np.median([i.departure["omega"] for i in intervals]) > OFF_MOMENTUM else "")
         )
     return ""
-
-
-def _whole_turns(interval: Interval) -> bool:
-    """Return whether theta alone is off, by a whole number of turns."""
-    turns = float(interval.theta[1] - interval.expected["theta"]) / (2 * np.pi)
-    return bool(round(turns) and abs(turns - round(turns)) < 1e-4)
 
 
 def _held(intervals: Sequence[Interval]) -> str:
@@ -303,7 +298,7 @@ def _inertia_cause(intervals: Sequence[Interval]) -> str:
     factors, *_ = np.linalg.lstsq(columns, np.full(len(r), momentum.mean()), rcond=1e-12)
     residual = rms(columns @ factors - momentum.mean())
     if len(r) < 12 or residual > 0.02 * np.std(momentum):
-        return _rate_cause(intervals) if _only_field(intervals) == "omega" else ""
+        return "omega alone is off: look at J omega" if _only_field(intervals) == "omega" else ""
     common = min(factors, key=lambda factor: (np.sum(np.abs(factors / factor - 1.0) > 0.003), abs(factor - 1.0)))
     wrong = {name: f for name, f in zip(parts, factors / common, strict=True) if abs(f - 1.0) > 0.003}
     counts = " and ".join(f"{name} counts {round(factor, 4):.3g} times" for name, factor in wrong.items())
@@ -325,23 +320,6 @@ def parts_of_inertia(throw: Scenario, r: FloatArray) -> dict[str, FloatArray]:
         "m sum (r - mean(r))^2": throw.slice_mass * ((r - mean[:, None]) ** 2).sum(axis=1),
         "M_b M_w/M (L/2 - mean(r))^2": reduced * (bottle.length / 2 - mean) ** 2,
     }
-
-
-def _rate_cause(intervals: Sequence[Interval]) -> str:
-    """Return which part of J changes omega too much or too little, if omega is a state: omega' = -omega J' / J."""
-    before, after = (parts_of_inertia(intervals[0].throw, np.array([i.r[k] for i in intervals])) for k in (0, 1))
-    changes = {name: (after[name] - before[name]) / sum(after.values()) for name in list(after)[1:]}
-    columns = np.array(list(changes.values())).T
-    errors = np.array([1.0 - i.omega[1] / i.expected["omega"] for i in intervals])
-    factors, *_ = np.linalg.lstsq(columns, errors, rcond=1e-12)
-    if len(errors) < 12 or rms(columns @ factors - errors) > 0.05 * rms(errors):
-        return "omega alone is off: look at J omega"
-    counts = " and ".join(
-        f"that of {name} counts {1 + factor:.2g} times"
-        for name, factor in zip(changes, factors, strict=True)
-        if abs(factor) > 0.02
-    )
-    return f"omega alone is off: of the changes of J = {' + '.join(after)} {counts}"
 
 
 def _undisturbed(intervals: Sequence[Interval]) -> list[Interval]:

@@ -19,7 +19,6 @@ from flipproof.foreign.likeness.mistakes import naming
 from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
-from slicemodel import Scenario
 from slicemodel.scenario import known_name, unknown_name
 
 PASSED: Final = "passed"
@@ -73,13 +72,17 @@ ENOUGH: Final = "enough"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """The outcome of one check; ``observation`` is None if it gave no numbers, and ``reason`` says why."""
+    """The outcome of one check; ``observation`` is None if it gave no numbers, and ``reason`` says why.
+
+    ``facts`` go into the passport.
+    """
 
     check: str
     verdict: str
     title: str
     observation: Observation | None = None
     reason: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def line(self) -> str:
@@ -125,11 +128,13 @@ class Certificate:
         domain = f"; asked were {domain_text(self.domain)}" if self.domain else ""
         return f"{len(self.results)} checks: {', '.join(parts)}{domain}"
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What the checks found out beside their verdicts, such as the ``place`` among the equations."""
+        return {name: fact for result in self.results for name, fact in result.facts.items()}
+
     def to_mapping(self) -> dict[str, Any]:
         """Return the passport: what the solver says of itself, the results, and the versions they were made with."""
-        facts: dict[str, Any] = {}
-        for result in self.results:
-            facts |= dict(result.observation.facts) if result.observation else {}
         return {
             "passport": 2,
             "solver": asdict(self.traits),
@@ -147,7 +152,7 @@ class Certificate:
                 for r in self.results
             ],
             "domain": {name: list(ends) for name, ends in self.domain.items()},
-            "facts": json_ready(facts),
+            "facts": json_ready(self.facts),
             "conclusion": self.conclusion,
         }
 
@@ -188,8 +193,6 @@ class _Recorder(Runner):
     def __init__(self, runner: Runner) -> None:
         self.runner, self.traits = runner, runner.traits
         self.answers: dict[tuple[Any, ...], Answer] = {}
-        self.unanswered: Ask | None = None
-        self.explained = False
         self.named: tuple[str, bool] | None = None
         self.domain: dict[str, tuple[float, float]] = {}
 
@@ -201,11 +204,7 @@ class _Recorder(Runner):
 
     def ask_again(self, ask: Ask) -> Answer:
         """Ask, even if the same was asked before, and return the answer."""
-        try:
-            answer = self.runner(ask)
-        except ForeignError:
-            self.unanswered = ask
-            raise
+        answer = self.runner(ask)
         for name, (_, value) in VARIED.items():
             values = np.append(value(ask), self.domain.get(name, ())) + 0.0  # a sticky throw's e is -0.0
             self.domain[name] = float(values.min()), float(values.max())
@@ -241,9 +240,7 @@ def certify(
         result = _result(name, suite[name], traits, recorder)
         if result.verdict == FAILED and result.observation is None:
             earlier_checks = [
-                earlier.check
-                for earlier in results
-                if earlier.observation is None and earlier.reason.startswith(result.reason)
+                earlier.check for earlier in results if earlier.observation is None and earlier.reason == result.reason
             ]
             result = replace(result, reason=f"as in {earlier_checks[0]}") if earlier_checks else result
         results.append(result)
@@ -266,10 +263,11 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     except WaitingError as why:
         return result(verdict=WAITING, reason=str(why))
     except NotApplicableError as why:
-        return result(verdict=IDLE, reason=str(why))
+        return result(verdict=IDLE, reason=str(why), facts=why.facts)
     except ForeignError as error:
-        message = f"{error}; known: {reason}" if reason else f"{error}{_answered_without(recorder)}"
+        message = f"{error}; known: {reason}" if reason else str(error)
         return result(verdict=FAILED if reason is None else EXPECTED, reason=message)
+    result = partial(result, facts=observation.facts)
     if observation.holds and reason is not None:
         return result(verdict=FAILED, observation=observation, reason=f"declared as a failure ({reason}), but holds")
     if observation.holds:
@@ -293,58 +291,6 @@ def _named(traits: Traits, recorder: _Recorder) -> tuple[str, bool]:
         with suppress(WaitingError):  # nobody is asked to write more answers for an advice
             recorder.named = drive(naming(traits), recorder)
     return recorder.named
-
-
-def _answered_without(recorder: _Recorder) -> str:
-    """Return which of rests, weight, drag or impacts must be left out for the failed ask to be answered, and advice.
-
-    Done once per solver, and only if it answers a throw without any of them.
-    """
-    ask, recorder.unanswered = recorder.unanswered, None
-    if ask is None or recorder.explained or ask.scenario.frozen:
-        return ""
-    recorder.explained = True
-    throw = ask.scenario
-    share = min(1.0, 1.0 / (abs(throw.omega0) * throw.duration))  # a radian, before most impacts
-    shortened = replace(ask, scenario=replace(throw, duration=share * throw.duration), times=share * ask.times)
-    bare = replace(shortened, scenario=replace(shortened.scenario, gravity=0.0, drag=0.0))
-
-    def answered(variant: Ask) -> bool:
-        try:
-            recorder(variant)
-        except WaitingError:
-            raise
-        except ForeignError:
-            return False
-        return True
-
-    def restless(throw: Scenario) -> Ask:
-        return replace(ask, scenario=replace(throw, restitution=1.0), start=elsewhere.far_from_ends(throw))
-
-    condition = ""
-    names: tuple[str, ...] = ()
-    with suppress(WaitingError):
-        if not answered(bare):
-            if answered(replace(bare, start=elsewhere.far_from_ends(throw))):
-                condition, names = "with every slice far from the ends", ("rests",)
-            return _look_at(condition, names)
-        others = {"weight": replace(throw, gravity=0.0), "drag": replace(throw, drag=0.0)}
-        name = next((name for name, other in others.items() if answered(replace(ask, scenario=other))), "")
-        without = name and f"without {name}, and with it "
-        if answered(restless(throw if name else replace(throw, gravity=0.0, drag=0.0))):
-            # An elastic impact is another one, too: what the weight or the drag lets begin may be either.
-            condition, names = f"{without}as long as no slice rests", ("rests", "impacts") if name else ("rests",)
-        elif answered(shortened):
-            condition, names = f"{without}up to the first impact", ("impacts", name) if name else ("impacts",)
-        elif name:
-            condition, names = f"without {name}", (name,)
-    return _look_at(condition, names)
-
-
-def _look_at(condition: str, names: tuple[str, ...]) -> str:
-    """Return under what condition an ask is answered, and what to look at; empty if none is known."""
-    parts = ", or at ".join(elsewhere.LOOK_AT[name] for name in names)
-    return parts and f"; the same is answered {condition}: look at {parts}"
 
 
 def _coverage(results: Iterable[Result]) -> Result:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, WaitingError
 from ode_reference.solver import REST_SPEED, REST_SPEED_WITH_RECOIL
@@ -29,7 +30,11 @@ CALM: Final[Mapping[str, Scenario]] = {"weight": replace(SMOOTH, gravity=0.0), "
 
 
 class NotApplicableError(Exception):
-    """A check cannot be made of this solver; the message says what is missing."""
+    """A check cannot be made of this solver; the message says what is missing, ``facts`` what it found all the same."""
+
+    def __init__(self, message: str, facts: Mapping[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.facts = dict(facts or {})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +99,30 @@ def refined_words(traits: Traits) -> str:
 def shift(first: Answer, second: Answer, scale: float) -> float:
     """Return the largest difference of two curves omega(t), as a fraction of ``scale``."""
     return float(np.max(np.abs(first.omega - second.omega)) / abs(scale))
+
+
+WRAPPED: Final = "theta is off by whole turns: do not wrap it"
+"""What to do if ``whole_turns`` holds."""
+
+
+def whole_turns(difference: ArrayLike, room: float) -> bool:
+    """Return whether an angle [rad] is off by whole turns, within ``room`` turns, at one time or more."""
+    turns = np.asarray(difference) / (2 * np.pi)
+    whole = np.rint(turns)
+    return bool(np.any(whole)) and float(np.max(np.abs(turns - whole))) <= room
+
+
+def scales(throw: Scenario, inertia: ArrayLike = ()) -> dict[str, float]:
+    """Return the scale of each field, for relative differences; of the inertia it is the largest value."""
+    spin, length = abs(throw.omega0), throw.bottle.length
+    return {
+        "omega": spin,
+        "theta": max(1.0, spin * throw.duration),
+        "r": length,
+        "r_cm": length,
+        "inertia": float(np.max(inertia, initial=0.0)) or 1.0,
+        "v": length * spin,
+    }
 
 
 def decimals_of(fields: Collection[FloatArray], candidates: Iterable[int]) -> int | None:

@@ -17,15 +17,18 @@ from flipproof.foreign.checking import (
     CALM,
     SMOOTH,
     THROW,
+    WRAPPED,
     CheckGenerator,
     NotApplicableError,
     Observation,
     ask_of,
     decimals_of,
     refined_words,
+    scales,
     shift,
     time_of_max,
     times_of,
+    whole_turns,
 )
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import departing
@@ -102,9 +105,8 @@ def check_start(traits: Traits) -> CheckGenerator:
             hint = f"omega(0) is off by as much at any times asked: {wrong}"
             if traits.precision == "float64" and errors["omega"] < SINGLE:
                 hint += "; so small an error is the rounding of single precision: keep places and J in float64"
-    turns = (answer.theta[0] - throw.theta0) / (2 * np.pi)
-    if worst == "theta" and round(turns) and abs(turns - round(turns)) < 1e-6:
-        hint = "theta is off by whole turns: do not wrap it"
+    if worst == "theta" and whole_turns(answer.theta[0] - throw.theta0, 1e-6):
+        hint = WRAPPED
     initial = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
     few_digits = _digits_advice(worst, initial[worst][0], float(initial[worst][1][0])) if worst in initial else ""
     if worst == "omega" and not (errors[worst] <= bound or cached or from_slope):
@@ -326,9 +328,7 @@ def check_ice(traits: Traits) -> CheckGenerator:
         bounds["theta"] = 1000 * traits.epsilon / 2
     expected = {"omega": "omega constant", "theta": "theta = theta_0 + omega_0 t", "r": "r constant"}
     worst = next((name for name in errors if not errors[name].max() <= bounds[name]), "omega")
-    turns = (answer.theta - THROW.theta0 - turned) / (2 * np.pi)
-    whole = np.rint(turns)
-    wrapped = worst == "theta" and bool(np.ptp(whole)) and float(np.max(np.abs(turns - whole))) <= bounds["theta"]
+    wrapped = worst == "theta" and whole_turns(answer.theta - THROW.theta0 - turned, bounds["theta"])
     return Observation(
         holds=float(errors[worst].max()) <= bounds[worst],
         expected=f"{expected[worst]} within {bounds[worst]:.1g}",
@@ -343,7 +343,7 @@ def check_ice(traits: Traits) -> CheckGenerator:
 def _ice_advice(worst: str, wrapped: bool, *, right_at_first: bool) -> str:
     """Return what to look at if ice is wrong in one field: theta wrapped, or right at first and wrong later."""
     if wrapped:
-        return "theta is off by whole turns: do not wrap it"
+        return WRAPPED
     if worst != "theta":
         return "hold every slice where it is when scenario.frozen is true"
     if not right_at_first:
@@ -397,8 +397,7 @@ def check_angle(traits: Traits) -> CheckGenerator:
     holds = sizes[0] <= bound or (_falls(sizes, min_ratio) and sizes[-1] <= 100 * bound)
     hint = "" if holds else _times_advice(answers[0]) or _jump_advice(asks[0].times, answers[0].omega / THROW.omega0)
     last_alone = not (holds or hint) and float(errors[0][:-1].max()) <= bound
-    turns = errors[0] / (2 * np.pi)
-    wrapped = not holds and turns.max() > 0.5 and np.all(np.abs(turns - np.round(turns)) < 0.01)
+    wrapped = not holds and whole_turns(errors[0], 0.01)
     if not (holds or hint or wrapped):
         effort = asks[0].effort or 0.0
         step = {"dt": effort, "steps": THROW.duration / max(effort, 1.0)}.get(traits.refined_by or "", 0.0)
@@ -430,7 +429,7 @@ def check_angle(traits: Traits) -> CheckGenerator:
         if stops
         else "the row at the end of the flight alone is wrong: look at whether the last step is taken, and answered"
         if last_alone
-        else "theta is off by whole turns: do not wrap it"
+        else WRAPPED
         if wrapped
         else f"{hint}theta is in radians and advances by omega dt, omega of the same instant, also over the rest of a "
         "step with an impact; or the omega answered is not the one by which theta advances",
@@ -625,7 +624,7 @@ def _defined(answer: Answer) -> tuple[dict[str, FloatArray], dict[str, FloatArra
     """Return r_cm and inertia that follow from r, and by how much those of an answer differ, as fractions."""
     assert answer.r is not None
     derived = {"r_cm": centre_of_mass(THROW, answer.r), "inertia": moment_of_inertia(THROW, answer.r)}
-    scale = {"r_cm": THROW.bottle.length, "inertia": float(np.max(derived["inertia"]))}
+    scale = scales(THROW, derived["inertia"])
     return derived, {name: np.abs(getattr(answer, name) - derived[name]) / scale[name] for name in derived}
 
 
@@ -1004,8 +1003,7 @@ STEP_OF_PROGRAM: Final[Mapping[str, str]] = {
 def _leaves_program(traits: Traits, answer: Answer) -> str:
     """Return at which step and in what a solver leaves the program that it declares, and what to look at."""
     program = solve(str(traits.equation), THROW, steps=len(answer.t))
-    size = {"r": THROW.bottle.length, "v": abs(THROW.omega0) * THROW.bottle.length, "omega": abs(THROW.omega0)}
-    size |= {"r_cm": THROW.bottle.length, "inertia": float(program.inertia[0]), "theta": 1.0}
+    size = scales(THROW, program.inertia[:1]) | {"theta": 1.0}
     for k, name in product(range(len(answer.t)), STEP_OF_PROGRAM):
         if name not in answer.given:
             continue
@@ -1046,7 +1044,7 @@ def check_equation(traits: Traits) -> CheckGenerator:
     """The solver is nearest to the equation it declares, and no farther from it than its own error explains."""
     place = yield from placing(traits)
     if traits.equation is None:
-        raise NotApplicableError(f"none is declared; {place.text}")
+        raise NotApplicableError(f"none is declared; {place.text}", {"place": place.to_mapping()})
     try:
         declared = name_of(switches_of(traits.equation))
     except ValueError as error:

@@ -41,9 +41,6 @@ NOISE: Final = 0.5
 ROUNDOFF: Final = 1e-11
 """Changes, as a fraction of a field's scale, below which orders drown in round-off."""
 
-LOCATED: Final = 1e-4
-"""Errors across impacts, fraction of omega_0, below which a tolerance of event location is no mistake."""
-
 FIELDS: Final = ("omega", "theta", "r", "v")
 
 
@@ -313,11 +310,11 @@ def check_order_across(traits: Traits) -> CheckGenerator:
         raise NotApplicableError(f"changes under refinement are round-off, {errors[0]:.2g} of omega_0")
     order, _ = observed_order(np.exp2(-np.array(LEVELS)), np.maximum(errors, 1e-300), floor=0.0)
     low = min(declared, 1.0) - 0.5
-    located = order < low and errors[-1] <= LOCATED
+    located = order < low and errors[-1] <= departures.LOCATED
     limited = f"; a tolerance of event location limits it at {errors[-1]:.1g}" if located else ""
     return Observation(
         holds=order >= low or located,
-        expected=f"order {low:g} or more, or errors below {LOCATED:g} of omega_0",
+        expected=f"order {low:g} or more, or errors below {departures.LOCATED:g} of omega_0",
         observed=f"{order:.2f}, {errors[-1]:.2g} of omega_0 at the finest{limited}",
         where=f"{throws[0].n_slices} to {throws[-1].n_slices} slices, 0.3 s with impacts on both ends, steps of 5 ms "
         "and its halves",

@@ -51,22 +51,20 @@ class Ask:
     start : array, shape (N,) - positions of the slices at release, from the cap [m], in any order, not only those of
         ``scenario.initial_positions()``; the slices are at rest in the bottle
     effort : float or None - the number that ``Traits.refined_by`` names; None if it names nothing
-    options : mapping - what the user gave the solver by name
     """
 
     scenario: Scenario
     times: FloatArray
     start: FloatArray
     effort: float | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, scenario: Scenario, times: FloatArray, effort: float | None = None, **options: Any) -> Ask:
+    def of(cls, scenario: Scenario, times: FloatArray, effort: float | None = None) -> Ask:
         """Return the ask for a throw from the start of Eq. 3a, every slice at rest in the water on the base."""
         start = scenario.initial_positions()
         for array in (times, start):
             array.setflags(write=False)
-        return cls(scenario=scenario, times=times, start=start, effort=effort, options=MappingProxyType(options))
+        return cls(scenario=scenario, times=times, start=start, effort=effort)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -229,12 +227,11 @@ class Answer:
         )
 
 
-def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
+def answer_of(ask: Ask, given: object) -> Answer:
     """Return a mapping, a Trajectory or any object with the attributes of ``Answer`` as a checked answer.
 
-    Times within 1e-6 of the duration of those asked, as a program prints them, are taken for those asked. With
-    ``own_times`` the answer is older than the ask, as a file is: its times need only increase. Raises AnswerError,
-    naming the field, what it holds and what is needed.
+    Times within 1e-6 of the duration of those asked, as a program prints them, are taken for those asked. Raises
+    AnswerError, naming the field, what it holds and what is needed.
     """
     if isinstance(given, Trajectory) and not given.ok:
         raise AnswerError(f"status = {given.status!r}: {given.message}")
@@ -244,21 +241,17 @@ def answer_of(ask: Ask, given: object, *, own_times: bool = False) -> Answer:
     if missing:
         kind = "" if isinstance(given, Mapping) else f" (a {type(given).__name__} came)"
         raise AnswerError(f"{' and '.join(missing)} missing{kind}; t, theta and omega are needed")
-    points = _length("t", fields["t"]) if own_times else len(ask.times)
+    points = len(ask.times)
     shapes: dict[str, tuple[int, ...]] = {name: (points,) for name in (*REQUIRED, *PER_TIME)}
     shapes |= {name: (points, ask.scenario.n_slices) for name in PER_SLICE}
     if isinstance(given, Trajectory) and len(given.r) != len(given.t):
         fields = {name: value for name, value in fields.items() if name not in PER_SLICE}
     arrays = {name: numbers_of(name, fields[name], shape) for name, shape in shapes.items() if name in fields}
     t = arrays["t"]
-    if own_times:
-        if not np.all(np.diff(t) > 0):
-            raise AnswerError("t does not increase")
-    elif points and float(np.max(np.abs(t - ask.times))) > 1e-6 * ask.scenario.duration:
+    if points and float(np.max(np.abs(t - ask.times))) > 1e-6 * ask.scenario.duration:
         k = int(np.argmax(np.abs(t - ask.times)))
         raise AnswerError(f"t[{k}] = {t[k]:.9g} s, asked was {ask.times[k]:.9g} s; answer at the times asked")
-    else:
-        arrays["t"] = ask.times
+    arrays["t"] = ask.times
     derived = tuple(name for name in PER_TIME if "r" in arrays and name not in arrays)
     for name, definition in zip(PER_TIME, (centre_of_mass, moment_of_inertia), strict=True):
         if name in derived:
@@ -350,7 +343,7 @@ def _impacts_of(given: object, n_slices: int) -> Impacts:
     return Impacts(**arrays | speeds)  # type: ignore[arg-type]
 
 
-def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Trajectory:
+def trajectory_of(ask: Ask, answer: Answer, name: str) -> Trajectory:
     """Return an answer as a Trajectory of method ``name``, for comparison with every other solver.
 
     ``diagnostics["not_given"]`` names what the solver did not give: inertia then follows from the conserved angular
@@ -374,8 +367,8 @@ def trajectory_of(ask: Ask, answer: Answer, name: str, **diagnostics: Any) -> Tr
         v=v,
         r_cm=r_cm,
         inertia=inertia,
-        settings={"spec": name, "effort": ask.effort, **ask.options},
-        diagnostics={"not_given": [field for field in PER_TIME if getattr(answer, field) is None], **diagnostics},
+        settings={"spec": name, "effort": ask.effort},
+        diagnostics={"not_given": [field for field in PER_TIME if getattr(answer, field) is None]},
     )
 
 

@@ -29,7 +29,7 @@ OUTPUTS: Final = 160
 """Outputs of a throw at which the reference is restarted."""
 
 LOCATED: Final = 1e-4
-"""``FLOOR`` across an impact, whose time may be located to a tolerance only."""
+"""``FLOOR`` across an impact, whose time may be located to a tolerance only; of omega as a fraction of omega_0."""
 
 SPOILED: Final = 5e-5
 """Departure at isolated impacts, at a quarter of the step, from which on they spoil an order of 2 or more.

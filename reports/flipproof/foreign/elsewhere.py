@@ -27,7 +27,15 @@ from typing import Any, Final
 import numpy as np
 
 import ode_reference
-from flipproof.foreign.checking import THROW, CheckGenerator, NotApplicableError, Observation, effort_of, rest_speed_of
+from flipproof.foreign.checking import (
+    THROW,
+    CheckGenerator,
+    NotApplicableError,
+    Observation,
+    effort_of,
+    rest_speed_of,
+    scales,
+)
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import UNEXPLAINED, departing
 from flipproof.foreign.place import name_of, placing, switches_of
@@ -355,20 +363,6 @@ def references(equation: str, ask: Ask) -> list[Trajectory]:
     ]
 
 
-def scales(ask: Ask, truth: Trajectory) -> dict[str, float]:
-    """Return the scale of each field, for relative differences; for the inertia its largest value."""
-    throw = ask.scenario
-    spin, length = abs(throw.omega0), throw.bottle.length
-    return {
-        "omega": spin,
-        "theta": max(1.0, spin * throw.duration),
-        "r": length,
-        "r_cm": length,
-        "inertia": float(np.max(truth.inertia, initial=0.0)) or 1.0,
-        "v": length * spin,
-    }
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
     """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
@@ -400,7 +394,7 @@ class Comparison:
 def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, unrefined: float) -> Comparison:
     """Compare the answer to one throw; ``answers`` holds the finest, then coarser ones if the solver can be refined."""
     truth, *twins = references(equation, ask)
-    scale = scales(ask, truth)
+    scale = scales(ask.scenario, truth.inertia)
     reached = min(len(run.t) for run in (truth, *twins))
 
     def sizes(flight: Any, other: Any, name: str) -> FloatArray:

@@ -1,8 +1,7 @@
-"""Solvers that answer by files: an existing curve, any program that reads and writes CSV, and a folder."""
+"""Solvers that answer by files: any program that reads and writes CSV, and a folder."""
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
 import re
@@ -29,46 +28,27 @@ from flipproof.foreign.contract import (
     answer_of,
 )
 from flipproof.foreign.processes import KEPT, ending, last_line
-from flipproof.foreign.specs import split_spec, words_of
+from flipproof.foreign.specs import words_of
 from flipproof.output.files import write_whole
+from flipproof.output.tables import Rows, number_of, other_separator, read_cells
 from slicemodel.scenario import unknown_name
+from slicemodel.trajectory import FloatArray
 
 
 def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
     """Read t, theta, omega and, if known, r_cm, inertia, r_0 ... and v_0 ... below a header, or raise AnswerError."""
-    max_bytes = 1 << 30
     try:
-        if path.stat().st_size > max_bytes:
-            raise AnswerError(f"{path} is larger than {max_bytes} bytes")
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = csv.reader(file)
-            header = [name.strip() for name in next(rows, [])]
-            body = [(rows.line_num, row) for row in rows if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise AnswerError(f"{path} cannot be read ({error})") from None
-    if len(header) == 1 and (separator := next((m for m in (";", "\t") if m in header[0]), "")):
-        kind = "semicolons" if separator == ";" else "tabs"
-        raise AnswerError(f"{path} separates its columns by {kind}; commas are needed, and points in numbers")
-    if not header or not body:
-        raise AnswerError(f"{path} has no {'rows' if header else 'header'}; columns t, theta, omega are needed")
-    if len(set(header)) < len(header):
-        repeated = next(name for name in header if header.count(name) > 1)
-        raise AnswerError(f"{path} names the column {repeated!r} twice")
-    cells: dict[str, list[float]] = {name: [] for name in header}
-    for line, row in body:
-        if len(row) != len(header):
-            hint = "; a decimal comma? numbers need points" if len(row) == 2 * len(header) else ""
-            raise AnswerError(f"{path}: line {line} has {len(row)} cells, the header {len(header)}{hint}")
-        for name, cell in zip(header, row, strict=True):
-            try:
-                cells[name].append(float(cell))
-            except ValueError as error:
-                comma = "; a decimal comma? numbers need points" if re.fullmatch(r"\s*[-+]?\d+,\d+.*", cell) else ""
-                raise AnswerError(f"{path}: line {line}, column {name}: {error}{comma}") from None
-    columns: dict[str, Any] = {name: np.array(values) for name, values in cells.items()}
+        names, rows = read_cells(path, max_bytes=1 << 30)
+        if hint := other_separator(names):
+            raise ValueError(f"{path}: {hint}")
+        if not rows:
+            raise ValueError(f"{path}: has no rows; columns t, theta, omega are needed")
+        columns: dict[str, Any] = dict(zip(names, _numbers(path, names, rows).T, strict=True))
+    except ValueError as error:
+        raise AnswerError(str(error)) from None
     for name in PER_SLICE:
         needed = [f"{name}_{i}" for i in range(n_slices)]
-        given = [column for column in header if re.fullmatch(rf"{name}_\d+", column)]
+        given = [column for column in names if re.fullmatch(rf"{name}_\d+", column)]
         if given and set(given) != set(needed):
             raise AnswerError(
                 f"{path} has {len(given)} columns from {given[0]} to {given[-1]}; a throw of {n_slices} slices needs "
@@ -77,6 +57,17 @@ def read_answer(path: Path, n_slices: int) -> dict[str, Any]:
         if given:
             columns[name] = np.column_stack([columns[column] for column in needed])
     return columns
+
+
+def _numbers(path: Path, names: list[str], rows: Rows) -> FloatArray:
+    """Return the numbers of a table, row by row; ``contract.numbers_of`` refuses what is not finite."""
+    try:
+        return np.array([[float(cell) for cell in cells] for _, cells in rows])
+    except ValueError:
+        for line, cells in rows:
+            for name, cell in zip(names, cells, strict=True):
+                number_of(path, line, name, cell)
+        raise
 
 
 def write_ask(ask: Ask, folder: Path) -> dict[str, str]:
@@ -92,27 +83,13 @@ def write_ask(ask: Ask, folder: Path) -> dict[str, str]:
     return paths | {"effort": "" if ask.effort is None else repr(ask.effort)}
 
 
-def answer_in(path: Path, ask: Ask, name: str, *, own_times: bool = False) -> Answer:
+def answer_in(path: Path, ask: Ask, name: str) -> Answer:
     """Return the checked answer of a file; a ForeignError calls the file by ``name``."""
     try:
-        return answer_of(ask, read_answer(path, ask.scenario.n_slices), own_times=own_times)
+        return answer_of(ask, read_answer(path, ask.scenario.n_slices))
     except AnswerError as error:
         message = str(error).replace(str(path), name)
         raise ForeignError(message if name in message else f"{name}: {message}") from None
-
-
-class File(Runner):
-    """A curve in a CSV file. It answers at its own times, whatever the throw."""
-
-    def __init__(self, spec: str) -> None:
-        self.path = Path(split_spec(spec)[1])
-        if not self.path.is_file():
-            raise ValueError(f"solver {spec!r}: there is no file {self.path}")
-        self.traits = Traits(name=self.path.name)
-
-    def __call__(self, ask: Ask) -> Answer:
-        """Return the curve, at its own times."""
-        return answer_in(self.path, ask, str(self.path), own_times=True)
 
 
 PLACEHOLDERS: Final = ("scenario", "times", "start", "effort", "out")
@@ -199,7 +176,7 @@ class Folder(Runner):
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the answer beside a question; add the question if it is new."""
-        text = json.dumps([ask.scenario.to_mapping(), ask.effort, dict(ask.options)], sort_keys=True).encode()
+        text = json.dumps([ask.scenario.to_mapping(), ask.effort], sort_keys=True).encode()
         key = hashlib.sha256(text + ask.times.tobytes() + ask.start.tobytes()).hexdigest()[:12]
         question = next(iter(self.folder.glob(f"[0-9]*-{key}")), None)
         if question is None:

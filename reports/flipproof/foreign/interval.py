@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 import ode_reference
-from flipproof.foreign.checking import rest_speed_of
+from flipproof.foreign.checking import rest_speed_of, scales
 from flipproof.foreign.contract import Answer, Ask, Started, begun
 from flipproof.foreign.place import switches_of
 from slicemodel.observables import moment_of_inertia
@@ -95,9 +95,8 @@ class Interval:
 def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[Interval]:
     """Carry on from the state at each output to the next."""
     throw, switches = ask.scenario, switches_of(equation)
-    length, spin = throw.bottle.length, abs(throw.omega0)
     rest_speed = rest_speed_of(switches)
-    scale = {"omega": spin, "r": length, "v": length * spin}
+    scale = scales(throw)
     assert answer.r is not None
     assert answer.v is not None
     intervals = []

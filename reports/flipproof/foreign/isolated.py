@@ -62,7 +62,7 @@ class Isolated(Runner):
             raise ForeignError(f"not asked: {PATIENCE} runs in a row gave no answer in time")
         if self._process is None:
             self.traits = self._start()
-        header = {"scenario": ask.scenario.to_mapping(), "effort": ask.effort, "options": dict(ask.options)}
+        header = {"scenario": ask.scenario.to_mapping(), "effort": ask.effort}
         limit = self.timeout or traits.timeout
         # Bytes of t, theta, omega, r_cm and inertia, of r and v of every slice, and of ten million impacts.
         max_bytes = 8 * (len(ask.times) * (5 + 2 * ask.scenario.n_slices) + 5 * 10_000_000)
@@ -208,7 +208,7 @@ def serve() -> None:
         except BrokenFrameError:
             return
         scenario = Scenario.from_mapping(header["scenario"])
-        ask = Ask(scenario=scenario, effort=header["effort"], options=header["options"], **arrays)
+        ask = Ask(scenario=scenario, effort=header["effort"], **arrays)
         _answer(outbox, solve, ask)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import math
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,18 +13,16 @@ import numpy as np
 
 from flipproof.foreign.checking import effort_of
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, answer_of, started, trajectory_of
-from flipproof.foreign.files import File, Folder, traits_of_command
+from flipproof.foreign.files import Folder, traits_of_command
 from flipproof.foreign.isolated import Isolated
 from flipproof.foreign.specs import (
     COMMAND,
+    CSV,
     OBJECT,
-    check_asked,
     check_spec,
     content_of,
-    is_folder,
     is_foreign,
     is_spec,
-    locate,
     split_spec,
 )
 from flipproof.frame import solvers
@@ -46,11 +43,10 @@ def solve(
     level: float = 0,
     timeout: float | None = None,
     label: str = "",
-    **options: Any,
 ) -> Trajectory:
     """Run the solver that a spec names, in a process of its own that is kept for the next run.
 
-    ``diagnostics["seconds"]`` is how long it took to answer. Raises ForeignError if it gives no answer.
+    Raises ForeignError if it gives no answer.
 
     Parameters
     ----------
@@ -59,49 +55,38 @@ def solve(
     level : float - refinement: 0 is a thousandth of the flight, each level halves the step
     timeout : float, optional - seconds that the run may take, instead of what the solver declares
     label : str - the method's name, instead of the solver's
-    options : passed to the solver by name
     """
     runner = _runner(spec, content_of(spec), timeout)
     given = effort_of(runner.traits, scenario, level) if effort is None else effort
-    ask = Ask.of(scenario, output_times(scenario, times), given, **options)
-    began = time.perf_counter()
+    ask = Ask.of(scenario, output_times(scenario, times), given)
     try:
         answer = runner(ask)
     except ForeignError as error:
         raise type(error)(f"{spec}: {error}") from None
-    seconds = time.perf_counter() - began
-    return trajectory_of(ask, answer, label or runner.traits.name, seconds=seconds)
+    return trajectory_of(ask, answer, label or runner.traits.name)
 
 
 def opened(
     spec: str,
     timeout: float | None = None,
     *,
-    curves: bool = False,
     memory: float | None = None,
     given: Mapping[str, Any] = MappingProxyType({}),
 ) -> Runner:
     """Return the solver that a spec names, ready to be asked; raises ValueError if it names nothing.
 
     A run may take ``timeout`` seconds, or what the solver declares, and ``memory`` bytes, or half of the machine's.
-    ``given`` are traits of a program or a folder, which cannot declare them. ``curves`` also admits a curve in a file,
-    which answers one throw at its own times and nothing else.
+    ``given`` are traits of a program or a folder, which cannot declare them.
     """
     kind, body = split_spec(spec)
     if given and kind == OBJECT:
         raise ValueError(f"solver {spec!r}: says itself what it is: {', '.join(given)} cannot be given")
     if not is_foreign(spec):
         return Own(solvers.find(spec))
-    if kind != OBJECT:
-        if kind == COMMAND:
-            return Isolated(spec, timeout, memory, traits_of_command(spec, timeout, given))
-        if is_folder(body):
-            return Folder(Path(body), given)
-        if not curves:
-            check_asked(spec)
-        return File(spec)
-    locate(spec)
-    return Isolated(spec, timeout, memory)
+    check_spec(spec)
+    if kind == CSV:
+        return Folder(Path(body), given)
+    return Isolated(spec, timeout, memory, traits_of_command(spec, timeout, given) if kind == COMMAND else None)
 
 
 _RUNNERS: Final[dict[tuple[str, float | None], tuple[str, Runner]]] = {}
@@ -114,7 +99,7 @@ def _runner(spec: str, content: str, timeout: float | None) -> Runner:
     if key in _RUNNERS and _RUNNERS[key][0] != content:
         _RUNNERS.pop(key)[1].close()
     if key not in _RUNNERS:
-        _RUNNERS[key] = content, opened(spec, timeout, curves=True)
+        _RUNNERS[key] = content, opened(spec, timeout)
     return _RUNNERS[key][1]
 
 
@@ -141,7 +126,7 @@ class Own(Runner):
 
     def __call__(self, ask: Ask) -> Answer:
         """Return the checked answer; the slice model computes on a uniform grid that holds the asked times."""
-        settings: dict[str, Any] = dict(ask.options)
+        settings: dict[str, Any] = {}
         grid: FloatArray | None = None
         if self.solver.package == "slicemodel":
             settings["steps"] = _points_of(ask)

@@ -4,7 +4,6 @@
     NAME                               an entry point, group flipproof.solvers or flipproof.engines
     package.module:name                an importable object
     path/to/file.py:name               an object of a file
-    csv:file.csv                       an existing curve: columns t, theta, omega
     csv:FOLDER                         questions as files, and the answers that somebody puts beside them
     cmd:"julia mine.jl {scenario} {times} {out}"     any program that reads and writes files
 
@@ -12,8 +11,8 @@ An object is a callable, an object with ``solve(ask)``, or a class of such objec
 strings, so that they can be sent to other processes; each process resolves them for itself.
 
 The same spec may name other code tomorrow, so runs are kept under a hash of what it names: for a file that file alone,
-for a module the whole package, for a program the files that its command names, for a curve its file. What code reads or
-imports from elsewhere is not hashed, nor are the modules beside a file.
+for a module the whole package, for a program the files that its command names, for a folder its answers. What code
+reads or imports from elsewhere is not hashed, nor are the modules beside a file.
 """
 
 from __future__ import annotations
@@ -64,14 +63,10 @@ def is_spec(name: str) -> bool:
 
 
 def check_spec(spec: str) -> None:
-    """Raise ValueError for a spec that names nothing; no foreign code runs."""
-    if split_spec(spec)[0] == OBJECT:
-        locate(spec)
-
-
-def check_asked(spec: str) -> None:
-    """Raise ValueError for a curve in a file, which cannot be asked for another throw."""
+    """Raise ValueError for a spec that names nothing, or a curve in a file; no foreign code runs."""
     kind, body = split_spec(spec)
+    if kind == OBJECT:
+        locate(spec)
     if kind == CSV and not is_folder(body):
         raise ValueError(
             f"solver {spec!r}: a curve cannot be asked; flipproof compare holds it against a solver, and certify "
@@ -162,9 +157,7 @@ def files_of(spec: str) -> Iterator[tuple[str, Path]]:
     """Yield every file that the spec of a foreign solver stands for, with the name that is hashed with it."""
     kind, body = split_spec(spec)
     if kind == CSV:
-        yield from (
-            [("", Path(body))] if not is_folder(body) else ((p.parent.name, p) for p in Path(body).rglob("answer.csv"))
-        )
+        yield from ((path.parent.name, path) for path in Path(body).rglob("answer.csv"))
         return
     if kind == COMMAND:
         for k, word in enumerate(words_of(spec)):

@@ -125,13 +125,18 @@ def other_separator(names: list[str]) -> str:
     return found and f"it has {found}: separate columns by commas, and write 0.5, not 0,5"
 
 
-def read_cells(path: Path) -> tuple[list[str], Rows]:
+DECIMAL_COMMA: Final = "a decimal comma? numbers need points"
+"""What may be wrong with a table in which numbers fall apart."""
+
+
+def read_cells(path: Path, max_bytes: int = 2**26) -> tuple[list[str], Rows]:
     """Return the names of a table's columns, and line number and cells of every row that is not blank.
 
-    Raises ValueError if the file cannot be read, is empty, names a column twice, or has a row of another length.
+    Raises ValueError if the file cannot be read, is larger than ``max_bytes``, is empty, names a column twice, or has a
+    row of another length.
     """
     try:
-        lines = read_text(path, 2**26).splitlines()
+        lines = read_text(path, max_bytes).splitlines()
     except UnsuitableFileError as error:
         raise ValueError(f"{path}: {error}") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -147,8 +152,9 @@ def read_cells(path: Path) -> tuple[list[str], Rows]:
     rows = [(n, _split(line)) for n, line in numbered[1:]]
     for n, cells in rows:
         if len(cells) != len(names):
-            hint = f" ({other})" if (other := other_separator(names)) else ""
-            raise ValueError(f"{path}: line {n} has {len(cells)} cells, the header has {len(names)}{hint}")
+            hint = other_separator(names) or (DECIMAL_COMMA if len(cells) == 2 * len(names) else "")
+            words = f" ({hint})" if hint else ""
+            raise ValueError(f"{path}: line {n} has {len(cells)} cells, the header has {len(names)}{words}")
     return names, rows
 
 
@@ -172,7 +178,8 @@ def number_of(path: Path, line: int, column: str, cell: str) -> float:
     try:
         value = float(cell)
     except ValueError:
-        raise ValueError(f"{path}: line {line}, column {column}: {cell.strip()!r} is not a number") from None
+        hint = f"; {DECIMAL_COMMA}" if "," in cell else ""
+        raise ValueError(f"{path}: line {line}, column {column}: {cell.strip()!r} is not a number{hint}") from None
     if not np.isfinite(value):
         raise ValueError(f"{path}: line {line}, column {column}: {cell.strip()} is not finite")
     return value

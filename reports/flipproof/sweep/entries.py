@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Final
 
-from flipproof.foreign.specs import check_asked, content_of
+from flipproof.foreign.specs import content_of
 from flipproof.frame.solvers import Solver, find, solve
 from flipproof.sweep.errors import SweepError, refuse_unknown
 from slicemodel.scenario import Scenario
@@ -55,7 +55,6 @@ def _entry(table: dict[str, Any], where: str) -> Entry:
         raise SweepError(f"{where} name = {name!r} is not a solver's name; 'flipproof models' lists them")
     try:
         solver = find(name)
-        check_asked(name)
         content = content_of(name)
     except ValueError as error:
         raise SweepError(f"{where}: {error}") from None

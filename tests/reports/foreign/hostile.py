@@ -11,7 +11,6 @@ import signal
 import sys
 import threading
 import time
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -143,7 +142,7 @@ def closes_every_file(ask):
     return good(ask)
 
 
-# ------------------------------------------------------------------ what it returns
+# ------------------------------------------------------------------ what it returns (more in test_contract)
 
 
 @wrong("t and theta and omega missing .a NoneType came.")
@@ -151,100 +150,11 @@ def returns_none(ask):
     return None
 
 
-@wrong("t and theta and omega missing .a generator came.")
-def returns_a_generator(ask):
-    return (x for x in good(ask).items())
-
-
-@wrong("t and theta and omega missing .a function came.")
-def returns_a_function(ask):
-    return good
-
-
-@wrong("omega missing; t, theta and omega are needed")
-def leaves_out_omega(ask):
-    found = good(ask)
-    del found["omega"]
-    return found
-
-
-@wrong(r"omega has shape \(60,\), not \(61,\)")
-def one_too_few(ask):
-    return with_omega(ask, good(ask)["omega"][:-1])
-
-
-@wrong(r"omega has shape \(61, 1\), not \(61,\)")
-def a_column(ask):
-    return with_omega(ask, good(ask)["omega"][:, None])
-
-
-@wrong(r"omega has shape \(\), not \(61,\)")
-def a_zero_dimensional_array(ask):
-    return with_omega(ask, np.float64(20.0))
-
-
-@wrong("omega is a float, not an array of numbers")
-def a_single_number(ask):
-    return with_omega(ask, 20.0)
-
-
-@wrong(r"omega has shape \(0,\), not \(61,\)")
-def nothing(ask):
-    return with_omega(ask, [])
-
-
 @wrong(r"omega\[3\] = nan is not finite")
 def not_a_number(ask):
     found = good(ask)
     found["omega"][3] = math.nan
     return found
-
-
-@wrong(r"theta\[60\] = inf is not finite")
-def infinite(ask):
-    found = good(ask)
-    found["theta"][-1] = math.inf
-    return found
-
-
-@wrong("omega holds complex numbers; real numbers are needed")
-def complex_numbers(ask):
-    return with_omega(ask, good(ask)["omega"] + 0j)
-
-
-@wrong("theta = 'abc' is not an array of numbers")
-def one_word(ask):
-    return good(ask) | {"theta": "abc"}
-
-
-@wrong("omega holds text; real numbers are needed")
-def words(ask):
-    return with_omega(ask, ["20.0"] * len(ask.times))
-
-
-@wrong("omega holds objects; real numbers are needed")
-def fractions(ask):
-    return with_omega(ask, [Fraction(20)] * len(ask.times))
-
-
-@wrong("omega holds truth values; real numbers are needed")
-def truths(ask):
-    return with_omega(ask, np.ones(len(ask.times), dtype=bool))
-
-
-@wrong("omega is no array of numbers .ValueError")
-def ragged(ask):
-    return with_omega(ask, [[1.0], [1.0, 2.0]] + [[1.0]] * (len(ask.times) - 2))
-
-
-@wrong(r"omega has shape \(1000000000,\), not \(61,\)")
-def a_thousand_million_points(ask):
-    return with_omega(ask, np.broadcast_to(20.0, 10**9))
-
-
-@wrong("asked was 0.005 s; answer at the times asked|asked was .* s; answer at the times asked")
-def times_of_its_own(ask):
-    return good(ask) | {"t": ask.times * 1.01}
 
 
 class Liar(list):
@@ -269,21 +179,6 @@ class Trap:
 @wrong("ZeroDivisionError: a trap")
 def answers_with_a_trap(ask):
     return Trap()
-
-
-@wrong(r"r has shape \(61, 3\), not \(61, 4\)")
-def a_slice_too_few(ask):
-    return good(ask) | {"r": np.ones((len(ask.times), 3))}
-
-
-@wrong("impacts: end missing")
-def impacts_without_ends(ask):
-    return good(ask) | {"impacts": {"time": [0.1], "slice": [0], "speed_before": [1.0], "speed_after": [0.5]}}
-
-
-@wrong(r"impacts.slice leaves \[0, 3\]")
-def an_impact_of_no_slice(ask):
-    return good(ask) | {"impacts": [(0.1, 9, 1, 1.0, 0.5)]}
 
 
 # ------------------------------------------------------------------ what it does to others

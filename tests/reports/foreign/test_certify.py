@@ -5,6 +5,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import combinations
 
+import made_up
 import numpy as np
 import pytest
 from planted import InProcess, patches
@@ -47,14 +48,11 @@ from slicemodel import Scenario
 from slicemodel.observables import moment_of_inertia
 
 
-class Exact:
-    """The reference as somebody's solver, for mistakes in what is answered: a flight takes a millisecond."""
+class Exact(made_up.Exact):
+    """The reference of free flight: a flight takes a millisecond."""
 
     equation = "free-flight"
-
-    def solve(self, ask):
-        found = ode_reference.solve(started(ask), self.equation, ask.times)
-        return {name: getattr(found, name) for name in ("t", "theta", "omega", "r", "v", "r_cm", "inertia")}
+    refined_by = None
 
 
 class InitialOmega(Exact):
@@ -105,15 +103,15 @@ class IceForward(Exact):
 class AlwaysHalf(Exact):
     """The restitution is 0.5, whatever the throw's is."""
 
-    def solve(self, ask):
-        return super().solve(replace(ask, scenario=replace(ask.scenario, restitution=0.5)))
+    def thrown(self, throw):
+        return replace(throw, restitution=0.5)
 
 
 class TenthLost(Exact):
     """The restitution is a tenth too low."""
 
-    def solve(self, ask):
-        return super().solve(replace(ask, scenario=replace(ask.scenario, restitution=0.9 * ask.scenario.restitution)))
+    def thrown(self, throw):
+        return replace(throw, restitution=0.9 * throw.restitution)
 
 
 class Overshoot(Subject):
@@ -599,15 +597,6 @@ def test_water_moves_in_every_throw():
                 assert len(flown.impacts.time) < 110 + 2 * knobs.slices
 
 
-def test_the_reference_begins_where_it_is_asked_to():
-    """By the reduced flow and, all 2N + 1 equations at once, by ``solve_ivp``."""
-    for knobs in drawn(3)[:3]:
-        ask = replace(knobs, angle=2.0).ask(3)
-        one, other = (ode_reference.solve(started(ask), "eq8", ask.times, method=m) for m in ("taylor", "DOP853"))
-        np.testing.assert_allclose(one.r, other.r, atol=1e-6 * ask.scenario.bottle.length)
-        np.testing.assert_allclose(one.omega, other.omega, rtol=1e-6)
-
-
 def test_a_full_bottle_need_not_begin_as_its_own_mirror_image():
     ask = replace(PAPER, filling=1.0, start="scattered", gravity=0.0, angle=3.0).ask(0)
     one, other = (ode_reference.solve(started(ask), "free-flight", ask.times, method=m) for m in ("taylor", "DOP853"))
@@ -978,28 +967,6 @@ def test_one_throw_tells_where_the_mistake_is(mistake, piece, words):
     runner = InProcess(solver, mistake)
     equation = name_of(switches_of(runner.traits.equation))
     assert words in " / ".join(drive(departing(runner.traits, equation, [PIECES[piece].ask(0)]), runner))
-
-
-def test_what_is_answered_far_from_the_ends_alone_points_to_rests():
-    class Stuck(Subject):
-        def solve(self, ask):
-            if np.max(ask.start) > 0.9 * ask.scenario.bottle.length:
-                raise ForeignError("the step became too small")
-            return super().solve(ask)
-
-    (shape,) = certify(InProcess(Stuck(), "x"), ["shape"]).results
-    assert "the same is answered with every slice far from the ends: look at rests" in shape.line
-
-
-def test_a_rest_that_weight_spoils_is_no_matter_of_the_weight():
-    class Chattering(Subject):
-        def solve(self, ask):
-            if ask.scenario.gravity and ask.scenario.restitution < 1.0:
-                raise ForeignError("the step became too small")
-            return super().solve(ask)
-
-    (shape,) = certify(InProcess(Chattering(), "x"), ["shape"]).results
-    assert "answered without weight, and with it as long as no slice rests: look at rests" in shape.line
 
 
 @pytest.mark.parametrize(

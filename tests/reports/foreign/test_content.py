@@ -135,7 +135,6 @@ def test_what_counts_as_the_content_of_each_kind_of_spec(tmp_path, monkeypatch):
         "mine:solve": {"mine.py"},
         "packed.inner:solve": {"packed/__init__.py", "packed/inner.py"},
         "alone.py:solve": {"alone.py"},
-        "csv:table.csv": {"table.csv"},
         program: {"table.csv", "program.py"},
     }
     whole = {spec: content_of(spec) for spec in seen}
@@ -152,8 +151,9 @@ def test_what_counts_as_the_content_of_each_kind_of_spec(tmp_path, monkeypatch):
 
 
 def test_what_cannot_be_read_is_said_in_one_line(tmp_path):
+    (tmp_path / "answers" / "0001" / "answer.csv").mkdir(parents=True)
     for spec, words in (
-        (f"csv:{tmp_path / 'nowhere.csv'}", "nowhere.csv cannot be read"),
+        (f"csv:{tmp_path / 'answers'}", "answer.csv cannot be read"),
         ("cmd:'open", "No closing quotation"),
         (f"{tmp_path / 'nowhere.py'}:solve", "there is no file"),
     ):

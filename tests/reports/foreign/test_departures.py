@@ -4,34 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_up import Exact
 from planted import InProcess, Patch, patches
 
-import ode_reference
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
 from flipproof.foreign.checking import NotApplicableError, drive
-from flipproof.foreign.contract import started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.elsewhere import STICKY, WHOLE
 from slicemodel.observables import moment_of_inertia
-
-
-class Exact:
-    """The reference as somebody's solver, thrown with another scenario than the one asked."""
-
-    equation = "eq8"
-    refined_by = "dt"
-
-    def thrown(self, throw):
-        return throw
-
-    def spoilt(self, _throw, flight):
-        return flight
-
-    def solve(self, ask):
-        throw = started(ask)
-        flight = ode_reference.solve(self.thrown(throw), self.equation, ask.times)
-        answer = {name: getattr(flight, name).copy() for name in ("t", "theta", "omega", "r", "v")}
-        return self.spoilt(throw, answer)
 
 
 def told(kind, *throws, **traits):

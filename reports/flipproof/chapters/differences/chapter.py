@@ -191,13 +191,20 @@ def claim_guest(d: Difference, guest: Guest, change: float | None) -> Iterator[F
     title, note = f"{d.second} and {d.first}: largest difference in ω", f"at t = {d.largest_time:.4g} s"
     yield observed(f"guest-{guest.slug}-{d.first}", title, d.largest, "of ω₀", note, band=band)
     if guest.traits is not None and guest.traits.equation == d.first:
-        room = UNREFINED if change is None else 1e-3 + 5 * (d.band or 0.0)
-        words = (
-            "it cannot be refined" if change is None else f"its own change between its finest efforts is {change:.2g}"
-        )
-        title = f"{d.second}: largest difference in ω from {d.first}, the equation that it declares"
-        note = f"N = {d.slices}, t = {d.largest_time:.4g} s; {words}"
-        yield regression(f"guest-{guest.slug}-flight", title, d.largest, "of ω₀", (0.0, room), note)
+        yield claim_flight(d, guest, change, "the equation that it declares")
+
+
+def claim_flight(d: Difference, guest: Guest, change: float | None, words: str) -> Finding:
+    """Return the claim that a guest's own error explains how far it is from an equation, which is its own by ``words``.
+
+    ``change`` is that of omega between its two efforts, fraction of omega_0; None if it cannot be refined.
+    """
+    room = UNREFINED if change is None else 1e-3 + 5 * (d.band or 0.0)
+    own = "it cannot be refined" if change is None else f"its own change between its efforts is {change:.2g}"
+    title = f"{d.second}: largest difference in ω from {d.first}, {words}"
+    note = f"N = {d.slices}, t = {d.largest_time:.4g} s; {own}"
+    band = Band.of(d.band, "twins and refinement")
+    return regression(f"guest-{guest.slug}-flight", title, d.largest, "of ω₀", (0.0, room), note, band=band)
 
 
 def _id(first: str, second: str) -> str:

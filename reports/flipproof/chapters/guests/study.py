@@ -1,156 +1,89 @@
-r"""What a report finds about a solver of somebody else beside its flight, which stands among those of all solvers.
+"""What a report finds about a solver of somebody else beside its flight, which stands among those of all solvers.
 
-It is certified in a worker. Its runs of the throw at four efforts say what refinement buys. The energy of its flight,
-in the frame of the centre of mass C_M, is that of turning and of sliding (Koenig):
-
-    E = J omega^2 / 2 + sum_i m (v_i - v_CM)^2 / 2 + M_b v_CM^2 / 2
-
-The difference to free flight is split over the assumptions that its equation still makes:
-
-    plateau of free flight - plateau of the guest = rest + sum of fair shares
-
-The rest is the plateau of the guest's equation minus that of the guest: its own error, and what is no assumption of the
-ladder. A fair share is the mean over all orders of changing the assumptions (``chapters.waterfall``).
+It is certified in a worker. If it declares no equation, its flight is held to the one on which the certificate places
+it, as that of another guest is to the equation that it declares (``chapters.differences``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import dataclass
 
-import numpy as np
-
-from flipproof.chapters.solvers import SPARSE, Guest
-from flipproof.chapters.waterfall.study import (
-    OBSERVABLES,
-    Bar,
-    Waterfall,
-    bars_of,
-    equation_run,
-    missed_by,
-    rods_run,
-)
+from flipproof.chapters.differences.study import Difference, study_difference
+from flipproof.chapters.solvers import Guest
 from flipproof.foreign.certify import Certificate, certify
 from flipproof.foreign.contract import ForeignError
-from flipproof.foreign.place import name_of, switches_of
 from flipproof.foreign.solving import opened
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Outcome, Run, Study, attempt
-from flipproof.frame.equations import NAMES
-from ode_reference.models import LADDER, MODELS
-from ode_reference.switches import Switches
-from slicemodel import Scenario, Trajectory
-from slicemodel.observables import centre_of_mass_velocity, plateau
-from slicemodel.trajectory import FloatArray
-
-FREE: Final = MODELS["free-flight"].switches
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Effort:
-    """One run of the throw: its effort, the seconds it took, and its largest difference to the guest's equation."""
-
-    effort: float
-    seconds: float
-    error: float
+from flipproof.frame.twins import omega_band_call
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visit:
-    """What a guest showed, each or the reason why not; ``efforts`` are by the names of their runs.
+    """What a guest showed; ``problems`` maps what is missing to the reason why.
 
-    ``equation`` is the rung that it declares, or the nearest; ``band`` the largest change of omega between its two
-    finest efforts, fraction of omega_0; ``rise`` the largest of its energy between two output times, fraction of E(0).
-    ``placed`` is the rung that the certificate places it on, if it declares none, and how far its flight is from that
-    one, fraction of omega_0.
+    ``placed`` compares its flight with the equation on which its certificate places it, if it declares none. ``change``
+    is that of omega between its two efforts, fraction of omega_0; None if unknown.
     """
 
     guest: Guest
     certificate: Outcome[Certificate]
-    equation: str
-    band: float | None
-    efforts: Mapping[str, Outcome[Effort]]
-    rise: float | None
-    waterfall: Outcome[Waterfall]
-    placed: tuple[str, float] | None = None
-
-    @property
-    def problems(self) -> dict[str, str]:
-        """What is missing, and why."""
-        if self.guest.problem:
-            return {"solver": self.guest.problem}
-        outcomes: dict[str, Outcome[Any]] = {"certificate": self.certificate, "waterfall": self.waterfall}
-        return {name: outcome.reason for name, outcome in {**outcomes, **self.efforts}.items() if outcome.reason}
-
-    @property
-    def refined(self) -> list[Effort]:
-        """The efforts that were made, the coarsest first."""
-        return [outcome.result for outcome in self.efforts.values() if outcome.result is not None]
+    problems: dict[str, str]
+    placed: Outcome[Difference]
+    change: float | None
 
 
 def study(ask: Ask) -> Study[tuple[Visit, ...]]:
-    """Certify the guests of ``ask.work``, and read the flights of those that could be loaded.
+    """Certify the guests of ``ask.work``, and compare those that declare no equation with the one that they solve.
 
     A call made anew is never answered from the store: whether somebody else's code changed is not known.
     """
     loaded = [guest for guest in ask.work if guest.traits is not None]
-    calls = {g: Call(certified, (g.spec, g.timeout), f"guest {g.label}", anew=True) for g in loaded if not g.curve}
-    ladder = {rung: ask.solvers[rung] for rung in LADDER} if loaded else {}
+    calls = {g: Call(certified, (g.spec, g.timeout), f"guest {g.label}", anew=True) for g in loaded}
     flown = {guest: guest.run(ask.throw) for guest in loaded}
     efforts = [run for guest in loaded for run in guest.efforts(ask.throw)]
-    flights = yield [*calls.values(), *ladder.values(), *flown.values(), *efforts]
-    rungs = {rung: run for rung, run in flights.trajectories(ladder).items() if run.ok}
-    visits = []
-    for guest in ask.work:
-        flight = flights.trajectory(flown[guest]) if guest in flown else None
-        equation = guest.equation(rungs, flight)
-        runs = guest.efforts(ask.throw)
-        certificate: Outcome[Certificate] = Outcome(None, "a curve in a file cannot be asked")
-        if guest in calls:
-            certificate = attempt(flights.answer, calls[guest])
-        visits.append(
-            Visit(
-                guest=guest,
-                certificate=certificate,
-                equation=equation,
-                band=guest.band(ask.throw, flights),
-                efforts={run.name: attempt(effort_of, run, rungs.get(equation), flights) for run in runs},
-                rise=rise_of(flight) if flight is not None and len(flight.v) == len(flight.t) else None,
-                waterfall=Outcome(None, "" if flight is None else "what it declares is no equation of the ladder"),
-                placed=placed_on(guest, certificate.result, rungs, flight),
-            )
+    flights = yield [*calls.values(), *flown.values(), *efforts]
+    certificates = {guest: attempt(flights.answer, call) for guest, call in calls.items()}
+    equations = {
+        guest: Run(equation, ask.throw, {}, equation)
+        for guest, certificate in certificates.items()
+        if (equation := placed_on(guest, certificate.result)) and flights.trajectory(flown[guest]) is not None
+    }
+    bands = {guest: omega_band_call(run) for guest, run in equations.items()}
+    flights = yield [*equations.values(), *bands.values()]
+
+    def visit(guest: Guest) -> Visit:
+        certificate = certificates.get(guest, Outcome(None))
+        reasons = {"solver": guest.problem, "certificate": certificate.reason}
+        reasons |= {run.name: flights[run].reason for run in guest.efforts(ask.throw)}
+        placed: Outcome[Difference] = Outcome(None)
+        if guest in equations:
+            placed = attempt(study_flight, guest, equations[guest], bands[guest], flights)
+        return Visit(
+            guest=guest,
+            certificate=certificate,
+            problems={name: reason for name, reason in reasons.items() if reason},
+            placed=placed,
+            change=guest.band(ask.throw, flights),
         )
-    starts = {visit.guest: start for visit in visits if (start := start_of(visit)) is not None}
-    flights = yield plan_splits(starts.values(), ask.throw)
-    return tuple(
-        replace(visit, waterfall=attempt(split, visit, ask.throw, starts[visit.guest], flights))
-        if visit.guest in starts
-        else visit
-        for visit in visits
-    )
+
+    return tuple(visit(guest) for guest in ask.work)
 
 
-def placed_on(
-    guest: Guest, certificate: Certificate | None, rungs: Mapping[str, Trajectory], flight: Trajectory | None
-) -> tuple[str, float] | None:
-    """Return the rung that a certificate places an undeclared solver on, and how far its flight is from it."""
-    place = place_in(certificate)
+def placed_on(guest: Guest, certificate: Certificate | None) -> str:
+    """Return the equation on which its certificate places a guest that declares none; empty if there is none."""
+    place = None if certificate is None else certificate.facts.get("place")
     declared = guest.traits is not None and guest.traits.equation is not None
-    if declared or flight is None or place is None or not place["on_lattice"] or place["equation"] not in rungs:
-        return None
-    rung = rungs[place["equation"]]
-    deviation = np.abs(np.interp(flight.t, rung.t, rung.omega) - flight.omega)
-    return str(place["equation"]), float(np.max(deviation) / abs(flight.scenario.omega0))
+    return "" if declared or place is None or not place["on_lattice"] else str(place["equation"])
 
 
-def place_in(certificate: Certificate | None) -> Mapping[str, Any] | None:
-    """Return where a certificate places a solver among the equations, if it does."""
-    results = () if certificate is None else certificate.results
-    places = [
-        r.observation.facts["place"] for r in results if r.observation is not None and "place" in r.observation.facts
-    ]
-    return places[0] if places else None
+def study_flight(guest: Guest, equation: Run, band: Call, flights: Flights) -> Difference:
+    """Compare the flight of a guest with that of an equation, whose own band is answered by ``band``."""
+    throw = equation.scenario
+    known, change = attempt(flights.answer, band).result, guest.band(throw, flights)
+    both = None if known is None or change is None else float(known[-1]) + change
+    name = f"{equation.name} and {guest.label}"
+    return study_difference(name, flights[equation].flight, flights[guest.run(throw)].flight, band=both)
 
 
 def certified(spec: str, timeout: float | None) -> Certificate:
@@ -160,101 +93,3 @@ def certified(spec: str, timeout: float | None) -> Certificate:
             return certify(runner)
     except ForeignError as error:
         raise Missing(str(error)) from None
-
-
-def effort_of(run: Run, reference: Trajectory | None, flights: Flights) -> Effort:
-    """Return what one effort costs and how far it is from the guest's equation."""
-    flight = flights[run].flight
-    if reference is None or len(reference.t[::SPARSE]) != len(flight.t):
-        raise Missing(f"{run.name}: there is no equation at its times to hold it against")
-    error = float(np.max(np.abs(reference.omega[::SPARSE] - flight.omega)) / abs(flight.scenario.omega0))
-    return Effort(effort=flight.settings["effort"], seconds=flight.diagnostics["seconds"], error=error)
-
-
-def rise_of(run: Trajectory) -> float:
-    """Return the largest rise of E(t) between two output times, fraction of E(0)."""
-    return float(max(0.0, np.max(np.diff(energy_of(run)), initial=0.0)))
-
-
-def energy_of(run: Trajectory) -> FloatArray:
-    """Return E(t) / E(0) in the frame of C_M (module docstring), shape (P,)."""
-    scenario, drift = run.scenario, centre_of_mass_velocity(run.scenario, run.v)
-    sliding = scenario.slice_mass * ((run.v - drift[:, None]) ** 2).sum(axis=1) + scenario.bottle.mass * drift**2
-    energy = (run.inertia * run.omega**2 + sliding) / 2
-    return np.asarray(energy / energy[0])
-
-
-# ---------------------------------------------------------------------- from a guest to free flight
-
-
-def start_of(visit: Visit) -> Switches | None:
-    """Return the switches of the equation that a guest declares, else of its place, else of the nearest rung.
-
-    None if it did not fly, or if what it declares converges to no equation of the ladder.
-    """
-    traits, certificate = visit.guest.traits, visit.certificate.result
-    if traits is not None and traits.equation is not None:
-        try:
-            return switches_of(traits.equation)
-        except ValueError:
-            return None
-    if (place := place_in(certificate)) is not None:
-        return Switches.from_name(place["switches"])
-    return switches_of(visit.equation) if visit.equation else None
-
-
-def differing(start: Switches) -> list[str]:
-    """Return the assumptions that an equation makes and free flight does not."""
-    return [name for name in NAMES if getattr(start, name) != getattr(FREE, name)]
-
-
-def mended(start: Switches, names: Iterable[str]) -> Switches:
-    """Return an equation with some assumptions mended."""
-    return replace(start, **{name: getattr(FREE, name) for name in names})
-
-
-def plan_splits(starts: Iterable[Switches], throw: Scenario) -> list[Run]:
-    """Return the runs that the splits need."""
-    runs: dict[Run, None] = {}
-
-    def ask(start: Switches, names: Sequence[str]) -> float:
-        runs[equation_run(throw, mended(start, names))] = None
-        return 0.0
-
-    for start in starts:
-        bars_of(differing(start), lambda names, start=start: ask(start, names), lambda _: 0.0)  # type: ignore[misc]
-        ask(start, ())
-        runs[rods_run(throw)] = None
-    return list(runs)
-
-
-def split(visit: Visit, throw: Scenario, start: Switches, flights: Flights) -> Waterfall:
-    """Split the difference between a guest's flight and free flight on the same throw.
-
-    A run that is not whole raises Missing; a rest and bars that miss the whole difference raise ArithmeticError.
-    """
-
-    def read(run: Run) -> float:
-        flight = flights[run].whole
-        if flight.t[-1] < throw.duration:
-            raise Missing(f"{run.name} does not reach the end of the flight")
-        return plateau(flight.t, flight.omega, throw.omega0)
-
-    def value(names: Sequence[str]) -> float:
-        return read(equation_run(throw, mended(start, names)))
-
-    guest_level, end = read(visit.guest.run(throw)), value(differing(start))
-    alike = dict.fromkeys(("forward", "backward", "average", "low", "high"), value(()) - guest_level)
-    alike |= dict.fromkeys(("forward_band", "average_band"), visit.band or 0.0)
-    bars = (Bar(name=f"the rest, to {name_of(start)}", **alike), *bars_of(differing(start), value, lambda _: 0.0))
-    return Waterfall(
-        observable=OBSERVABLES[0],
-        slices=throw.n_slices,
-        start=guest_level,
-        end=end,
-        end_band=0.0,
-        bars=bars,
-        residual=missed_by(bars, guest_level, end),
-        rods=read(rods_run(throw)),
-        solver=visit.guest.label,
-    )

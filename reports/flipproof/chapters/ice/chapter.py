@@ -74,13 +74,12 @@ def study(ask: Ask) -> Study[Ice]:
     for dt in float(times[1]) / np.array([1, 2, 4]) if ask.work else ():
         label = f"{ENGINE} welded, Δt = {dt:.2g} s"
         welded[label] = Run(ENGINE, coarse, {"ice": "welded", "dt": float(dt), "times": times}, f"ice, {label}")
-    asked = {label: guest for label, guest in ask.guests.items() if not guest.curve}
-    guests = {label: guest.run(ice, 0) for label, guest in asked.items()}
+    guests = {label: guest.run(ice, 0) for label, guest in ask.guests.items()}
     flights = yield [*rigid.values(), *welded.values(), *guests.values()]
     rigid_results, welded_results, guest_results = (
         {label: flights[run] for label, run in runs.items()} for runs in (rigid, welded, guests)
     )
-    return Ice(rigid_results, welded_results, guest_results, {label: guest.slug for label, guest in asked.items()})
+    return Ice(rigid_results, welded_results, guest_results, {label: guest.slug for label, guest in ask.guests.items()})
 
 
 def measure(label: str, run: Trajectory) -> Drift:

@@ -106,7 +106,7 @@ def bars_csv(waterfall: Waterfall) -> str:
          f"mean of all orders [{unit}]", f"band of the mean [{unit}]", f"least of all orders [{unit}]",
          f"largest of all orders [{unit}]"),
         (
-            (f"({waterfall.solver})", waterfall.start, None, waterfall.start, waterfall.start, None, None, None),
+            ("(published program)", waterfall.start, None, waterfall.start, waterfall.start, None, None, None),
             *((b.name, b.forward, b.forward_band, b.backward, b.average, b.average_band, b.low, b.high)
               for b in waterfall.bars),
             ("(free flight)", waterfall.end, waterfall.end_band, waterfall.end, waterfall.end, waterfall.end_band,
@@ -124,7 +124,7 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
     Below, hatched: what forbidding overlap changes, from free flight to rods.
     """
     figure, (ladder, orders) = new_figure(1, 2, size=(8.0, 4.9), sharey=True, width_ratios=(1.5, 1.0))
-    names = [waterfall.solver, *(bar.name for bar in waterfall.bars), "free flight"]
+    names = ["published program", *(bar.name for bar in waterfall.bars), "free flight"]
     places = list(range(len(names), 0, -1))
     ladder.barh(places[0], waterfall.start, color=WHOLE, height=0.6)
     ladder.barh(places[-1], waterfall.end, color=WHOLE, height=0.6, xerr=waterfall.end_band, capsize=3)

@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from flipproof.frame.equations import NAMES, canonical
@@ -110,7 +109,7 @@ class Waterfall:
 
     ``rods`` is the observable of water that cannot overlap, in the margin of the split; ``finer_end`` that of free
     flight at ``FINER`` times the slices, None if that was not computed. ``groupings`` are fair shares in other counts
-    of what is one change, by the names of ``GROUPINGS``. ``solver`` is where the split begins.
+    of what is one change, by the names of ``GROUPINGS``.
     """
 
     observable: Observable
@@ -123,11 +122,10 @@ class Waterfall:
     rods: float
     finer_end: float | None = None
     groupings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    solver: str = "published program"
 
     @property
     def total(self) -> float:
-        """Free flight minus the solver."""
+        """Free flight minus the published program."""
         return self.end - self.start
 
     @property
@@ -199,7 +197,7 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
     alike = dict.fromkeys(("forward", "backward", "average", "low", "high"), step)
     alike |= dict.fromkeys(("forward_band", "average_band"), bands[none])
     bars = [Bar(name=STEP, finer=more[none] - observed[finer(program)] if more else None, **alike)]
-    bars += bars_of(
+    bars += _bars_of(
         tuple(NAMES),
         lambda names: values[mended(names)],
         lambda names: bands[mended(names)],
@@ -212,7 +210,7 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
         end=values[everything],
         end_band=bands[everything],
         bars=tuple(bars),
-        residual=missed_by(bars, start, values[everything]),
+        residual=_missed_by(bars, start, values[everything]),
         rods=observed[rods_run(program.scenario)],
         finer_end=more[everything] if more else None,
         groupings={
@@ -221,11 +219,11 @@ def _split(observable: Observable, program: Run, observed: Mapping[Run, float]) 
     )
 
 
-def bars_of(
+def _bars_of(
     order: Sequence[str],
     value: Callable[[Sequence[str]], float],
     band: Callable[[Sequence[str]], float],
-    finer_shares: Mapping[str, float] = MappingProxyType({}),
+    finer_shares: Mapping[str, float],
 ) -> list[Bar]:
     """Return a bar an assumption; ``value`` and ``band`` are of the equation in which some of them are mended."""
     bars = []
@@ -249,7 +247,7 @@ def bars_of(
     return bars
 
 
-def missed_by(bars: Sequence[Bar], start: float, end: float) -> float:
+def _missed_by(bars: Sequence[Bar], start: float, end: float) -> float:
     """Return by how much bars miss the whole; more than round-off raises an ArithmeticError."""
     residual: float = max(
         abs(end - start - sum(getattr(bar, split) for bar in bars)) for split in ("forward", "backward", "average")
