@@ -176,9 +176,10 @@ def start_staggered(world: World, step: float, lag: float = 0.0) -> None:
 
 
 class BatchReader:
-    """Reads all bodies in one call; ``pymunk.batch`` is experimental, so it is compared with single reads first.
+    """Reads the tube and all slices, in this order; columns are x, y, angle, v_x, v_y, angular velocity.
 
-    Rows are bodies in order of insertion, columns x, y, angle, v_x, v_y, angular velocity.
+    One call reads all bodies, in the order in which they were added. Where that is another order, as in a run whose
+    slices are shuffled, or where the experimental ``pymunk.batch`` differs from single reads, each is read by itself.
     """
 
     def __init__(self, world: World) -> None:

@@ -155,12 +155,13 @@ def test_a_flight_is_held_to_where_the_certificate_places_a_solver_that_declares
 
 
 @pytest.mark.usefixtures("placed")
-def test_a_solver_may_be_placed_beside_the_ladder(tmp_path):
+@pytest.mark.parametrize("declares", ["", "solve.equation = 'switches:101100'\n"], ids=["silent", "declared"])
+def test_a_solver_may_solve_an_equation_beside_the_ladder(tmp_path, declares):
     file = tmp_path / "beside.py"
     file.write_text(
         "from flipproof.foreign.contract import started\nfrom ode_reference import solve as reference\n\n\n"
         "def solve(ask):\n"
-        "    return reference(started(ask), 'switches:101100', ask.times)\n\n\nsolve.name = 'beside'\n"
+        "    return reference(started(ask), 'switches:101100', ask.times)\n\n\nsolve.name = 'beside'\n" + declares
     )
     claim = Reported(f"{file}:solve").findings["guest-beside-flight"]
     assert claim.verdict == "pass"

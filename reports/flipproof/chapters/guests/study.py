@@ -1,7 +1,7 @@
 """What a report finds about a solver of somebody else beside its flight, which stands among those of all solvers.
 
-It is certified in a worker. If it declares no equation, its flight is held to the one on which the certificate places
-it, as that of another guest is to the equation that it declares (``chapters.differences``).
+It is certified in a worker. If it declares no rung of the ladder, its flight is held to the equation on which the
+certificate places it, as that of another guest is to the rung that it declares (``chapters.differences``).
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from flipproof.foreign.contract import ForeignError
 from flipproof.foreign.solving import opened
 from flipproof.frame.chapter import Ask, Call, Flights, Missing, Outcome, Run, Study, attempt
 from flipproof.frame.twins import omega_band_call
+from ode_reference.models import LADDER
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Visit:
     """What a guest showed; ``problems`` maps what is missing to the reason why.
 
-    ``placed`` compares its flight with the equation on which its certificate places it, if it declares none. ``change``
-    is that of omega between its two efforts, fraction of omega_0; None if unknown.
+    ``placed`` compares its flight with the equation on which its certificate places it, if it declares no rung.
+    ``change`` is that of omega between its two efforts, fraction of omega_0; None if unknown.
     """
 
     guest: Guest
@@ -34,7 +35,7 @@ class Visit:
 
 
 def study(ask: Ask) -> Study[tuple[Visit, ...]]:
-    """Certify the guests of ``ask.work``, and compare those that declare no equation with the one that they solve.
+    """Certify the guests of ``ask.work``, and compare those that declare no rung with the equation that they solve.
 
     A call made anew is never answered from the store: whether somebody else's code changed is not known.
     """
@@ -71,10 +72,10 @@ def study(ask: Ask) -> Study[tuple[Visit, ...]]:
 
 
 def placed_on(guest: Guest, certificate: Certificate | None) -> str:
-    """Return the equation on which its certificate places a guest that declares none; empty if there is none."""
+    """Return the equation on which its certificate places a guest that declares no rung; empty if there is none."""
     place = None if certificate is None else certificate.facts.get("place")
-    declared = guest.traits is not None and guest.traits.equation is not None
-    return "" if declared or place is None or not place["on_lattice"] else str(place["equation"])
+    declares_rung = guest.traits is not None and guest.traits.equation in LADDER
+    return "" if declares_rung or place is None or not place["on_lattice"] else str(place["equation"])
 
 
 def study_flight(guest: Guest, equation: Run, band: Call, flights: Flights) -> Difference:
