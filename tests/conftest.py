@@ -21,6 +21,9 @@ LOOPS = (
     "from slicemodel import Scenario, Table, Touch; from ode_reference import land; throw = Scenario(n_slices=2); "
     "still = {'theta': 0.1, 'omega': 0.0, 'velocity': (0.0, -1.0), 'v': [0.0, 0.0]}; "
     "land(Touch(scenario=throw, r=throw.initial_positions(), **still), Table(height=0.0))",
+    "import numpy as np; from engine_check.landing import impulses; from flipproof.foreign.elsewhere import PAPER; "
+    "from flipproof.foreign.likeness.flight import Mistake, fly; fly(PAPER.ask(0), Mistake()); "
+    "impulses(np.eye(1), np.zeros(1), np.zeros(1), np.zeros(1, np.int64), 0.5)",
 )
 """A call of each compiled loop."""
 
@@ -51,9 +54,10 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
     for item in items:
         made = item._fixtureinfo.name2fixturedefs
-        if not made.keys().isdisjoint(("gathered", "folder", "browser")):
+        lasting = {name: result[-1].scope for name, result in made.items() if result[-1].scope != "function"}
+        if any(lasting.get(name, "module") != "module" for name in ("gathered", "folder", "browser")):
             item.add_marker(pytest.mark.xdist_group("evidence"))
-        elif any(result[-1].scope == "module" for result in made.values()):
+        elif "module" in lasting.values():
             item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 

@@ -2,11 +2,13 @@
 
 import io
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from flipproof import page
 from flipproof.output.inline import LETTERS, SIZE
 
 PAPER = (695, 1013)
@@ -16,14 +18,16 @@ PAPER = (695, 1013)
 @pytest.fixture(
     scope="module",
     params=[
-        (file, size, scheme)
+        pytest.param(
+            (file, (width, height), scheme),
+            marks=[pytest.mark.slow] * (scheme == "dark"),
+            id=f"{file.partition('.')[0]}-{width}-{scheme}",
+        )
         for file in ("index.html", "evidence.html")
-        for size, scheme in (
-            ((1440, 900), "light"), ((1440, 900), "dark"), ((390, 844), "light"), ((390, 844), "dark"),
-            ((820, 1180), "light"),
+        for width, height, scheme in (
+            (1440, 900, "light"), (1440, 900, "dark"), (390, 844, "light"), (390, 844, "dark"), (820, 1180, "light"),
         )
     ],
-    ids=lambda params: f"{params[0].partition('.')[0]}-{params[1][0]}-{params[2]}",
 )  # fmt: skip
 def opened(request, visit):
     file, size, scheme = request.param
@@ -31,6 +35,17 @@ def opened(request, visit):
         visited.page.evaluate("document.querySelectorAll('details').forEach(details => { details.open = true; })")
         visited.settle()
         yield visited
+
+
+def test_the_dark_changes_colours_alone():
+    """What is laid out in the light is not laid out in the dark again on every push."""
+    assets, changed = Path(page.__file__).parent / "assets", set()
+    for sheet in assets.glob("*.css"):
+        for rules in re.findall(r"dark\) \{((?:[^{}]*\{[^{}]*\})+)\s*\}", sheet.read_text(encoding="utf-8")):
+            for declarations in re.findall(r"\{([^{}]*)\}", rules):
+                changed |= {one.partition(":")[0].strip() for one in declarations.split(";")} - {""}
+    assert len(changed) > 20
+    assert {name for name in changed if not name.startswith("--")} <= {"color-scheme", "filter", "mix-blend-mode"}
 
 
 def test_nothing_reaches_beyond_the_window(opened):

@@ -72,18 +72,21 @@ def place(tmp_path):
     return tmp_path
 
 
-@COMMANDS
-def test_a_command_ends_with_its_own_status_on_a_poor_console(place, status, arguments):
+@pytest.mark.parametrize(
+    ("status", "arguments"), [(1, ["diff", SNAPSHOT, "changed.json"]), (2, ["check", "≤.toml"])], ids=["out", "error"]
+)
+def test_a_program_ends_with_its_own_status_on_a_poor_console(place, status, arguments):
     told = flipproof(place, *arguments, encoding="ascii")
     assert told.returncode == status, told.stderr
     assert "Traceback" not in told.stderr
 
 
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 @COMMANDS
-def test_it_does_so_on_a_console_of_another_encoding(place, monkeypatch, status, arguments):
+def test_every_command_does_so_on_such_a_console(place, monkeypatch, status, arguments, encoding):
     """In this process: what ends a program on such a console is what it writes."""
     monkeypatch.chdir(place)
-    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding="cp1252") for name in ("stdout", "stderr")}
+    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding=encoding) for name in ("stdout", "stderr")}
     for name, stream in streams.items():
         monkeypatch.setattr(sys, name, stream)
     try:
@@ -92,7 +95,7 @@ def test_it_does_so_on_a_console_of_another_encoding(place, monkeypatch, status,
         ended = left.code
     for stream in streams.values():
         stream.flush()
-    said = streams["stderr"].buffer.getvalue().decode("cp1252")
+    said = streams["stderr"].buffer.getvalue().decode(encoding)
     assert ended == status, said
     assert "Traceback" not in said
 

@@ -250,7 +250,7 @@ def test_a_mount_point_is_refused_before_the_work(tmp_path):
             check_replaceable(place, "report")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_an_interrupted_report_leaves_the_old_one(target, number):
     process = subprocess.Popen(
         [sys.executable, "-m", "flipproof", "report", "--quick", "--out", str(target)],

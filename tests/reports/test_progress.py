@@ -86,10 +86,45 @@ def on_a_terminal(command, **settings):
     return shown.decode()
 
 
-def test_compiling_is_told_once_and_only_when_it_happens(tmp_path):
+LOOPS = """
+from slicemodel.compiled import kept_on_disk
+
+
+@kept_on_disk()
+def twice(x):
+    return 2.0 * x
+
+
+@kept_on_disk()
+def thrice(x):
+    return 3.0 * x
+"""
+PROGRAM = """
+import sys
+
+import loops
+
+from flipproof.cli import foreign
+from flipproof.cli.main import main
+
+foreign.command_models = lambda _: loops.twice(1.0) + loops.thrice(1.0) != 5.0
+sys.exit(main(["models"]))
+"""
+"""A command of two small loops."""
+
+
+@pytest.mark.parametrize("real", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["small", "simulate"])
+def test_compiling_is_told_once_and_only_when_it_happens(tmp_path, real):
     """With a cache of numba's that is empty, then with the one that this leaves."""
-    command = [sys.executable, "-m", "flipproof", "simulate", "--slices", "2", "--out", str(tmp_path / "a.csv")]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    folder = tmp_path / "program"
+    folder.mkdir()
+    (folder / "loops.py").write_text(LOOPS, encoding="utf-8")
+    (folder / "program.py").write_text(PROGRAM, encoding="utf-8")
+    command = [sys.executable, str(folder / "program.py")]
+    if real:
+        command = [sys.executable, "-m", "flipproof", "simulate", "--slices", "2", "--out", str(tmp_path / "a.csv")]
+    path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": path}
     assert [on_a_terminal(command, env=environment).count(WORDS) for _ in range(2)] == [1, 0]
 
 

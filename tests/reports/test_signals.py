@@ -9,7 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from made_up import alive, command, wait_for
+from made_up import alive, command, refused, wait_for
+
+from flipproof.cli import signals
 
 ROOT = Path(__file__).resolve().parents[2]
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc, and asks the kernel for a parent-death signal")
@@ -35,7 +37,10 @@ def processor_seconds(process):
 
 
 @LINUX
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, *(pytest.param(each, marks=pytest.mark.slow) for each in (signal.SIGTERM, signal.SIGHUP))],
+)
 def test_a_signal_ends_what_compiled_code_would_do_for_hours(capsys, tmp_path, number):
     command(capsys, "simulate", "--solver", "eq8", "--slices", 3, "--out", tmp_path / "short.csv")  # compiles
     (tmp_path / "throw.toml").write_text(HOURS, encoding="utf-8")
@@ -46,6 +51,26 @@ def test_a_signal_ends_what_compiled_code_would_do_for_hours(capsys, tmp_path, n
         _, said = process.communicate(timeout=300)
     assert (process.returncode, said) == (130, "flipproof: interrupted; nothing was overwritten\n")
     assert not (tmp_path / "out.csv").exists()
+
+
+@LINUX
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_every_signal_ends_a_command(capsys, monkeypatch, number):
+    """In this process; how a program ends is told by the one above."""
+
+    def interrupted(_):
+        signal.raise_signal(number)
+        return 0
+
+    before = {each: signal.signal(each, lambda *_: None) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    monkeypatch.setattr("flipproof.cli.foreign.command_models", interrupted)
+    monkeypatch.setattr(signals, "SIGNALS", signals._handled())
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    try:
+        assert command(capsys, "models") == (130, "", "flipproof: interrupted; nothing was overwritten\n")
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 @LINUX
@@ -60,12 +85,9 @@ def test_a_hangup_that_is_ignored_stays_ignored(tmp_path):
 
 
 @pytest.mark.parametrize("solver", ["exact-step", "eq8", "column"])
-def test_an_answer_that_does_not_fit_is_refused_before_it_is_begun(tmp_path, solver):
-    with flipproof(tmp_path, "simulate", "--solver", solver, "--slices", 1_000_000, "--out", "out.csv") as process:
-        _, said = process.communicate(timeout=300)
-    assert process.returncode == 2
-    assert said.startswith("flipproof: error: n_slices = 1000000 at 1000 output times need 14.9 GiB (admissible: ")
-    assert said.count("\n") == 1
+def test_an_answer_that_does_not_fit_is_refused_before_it_is_begun(capsys, tmp_path, solver):
+    words = "flipproof: error: n_slices = 1000000 at 1000 output times need 14.9 GiB (admissible: "
+    refused(capsys, words, "simulate", "--solver", solver, "--slices", 1_000_000, "--out", tmp_path / "out.csv")
 
 
 PROGRAM = """

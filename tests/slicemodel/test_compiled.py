@@ -159,7 +159,7 @@ DAMAGES = {
 
 
 def test_a_damaged_file_of_the_cache_is_thrown_away_and_made_again(package):
-    """In processes of their own, which damaged machine code may end."""
+    """Damaged machine code, of the files ``nbc``, may end the process that runs it; an index is read in this one."""
     path = os.pathsep.join([str(package.root), str(Path(compiled.__file__).parent.parent)])
     environment = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(package.root / "cache")}
 
@@ -170,7 +170,7 @@ def test_a_damaged_file_of_the_cache_is_thrown_away_and_made_again(package):
     for kind, damage in (("nbi", "empty"), ("nbi", "cut"), ("nbc", "cut"), ("nbc", "one bit")):
         (file,) = (package.root / "cache").rglob(f"*.{kind}")
         file.write_bytes(DAMAGES[damage](file.read_bytes()))
-        assert alone() == "2.0 0\n", (kind, damage)
+        assert (alone().rstrip() if kind == "nbc" else package()) == "2.0 0", (kind, damage)
     assert package() == "2.0 1"
 
 

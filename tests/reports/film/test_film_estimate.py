@@ -3,6 +3,7 @@
 import re
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -90,7 +91,13 @@ def rates():
 
 @pytest.fixture(scope="module")
 def eq8():
-    return judged_of(clip(5, fps=120, model="eq8", noise=0.5e-3))
+    return judged_of(clip(5, fps=60, model="eq8", noise=0.5e-3))
+
+
+@pytest.fixture
+def not_exchanged(monkeypatch):
+    """Spare a check that is there for something else the search for a flight with cap and base exchanged."""
+    monkeypatch.setattr("flipproof.film.judge.exchange_gain", lambda *_: -np.inf)
 
 
 HARD = {
@@ -111,16 +118,23 @@ HARD = {
 }
 
 
+PUSHED = ("a first guess that ends 0.2 s early", "a ridge of gamma and e narrower than a cell")
+"""Those of them that are read on every push: a long film and a short one."""
+
+
 @pytest.fixture(scope="module")
 def hard():
-    """Films that were once read wrongly, by what misled."""
-    found = {}
-    for words, (seed, options) in HARD.items():
+    """Return a film that was once read wrongly, by what misled; each is estimated when it is first asked for."""
+
+    @cache
+    def read(words):
+        seed, options = HARD[words]
         rng = np.random.default_rng(seed)
         truth = {"gamma": rng.uniform(2, 10), "e": rng.uniform(0.1, 0.8), "omega0": rng.uniform(14, 22)}
         made = film_simulator.film(rng, slices=6, **options, **truth)
-        found[words] = judged_of(made, options.get("filling", 0.5))
-    return found
+        return judged_of(made, options.get("filling", 0.5))
+
+    return read
 
 
 def test_the_slope_of_every_value_is_that_of_the_model(poor):
@@ -166,12 +180,13 @@ def test_what_the_motions_of_a_hand_describe_is_not_left_to_the_variance(quick):
     assert variance[held & (one.film.t < one.likelihood.touch)].max() < 4 * one.best["noise"] ** 2
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say(poor, bottles, quick, hard):
+@pytest.mark.parametrize("misled", [PUSHED, pytest.param(tuple(HARD), marks=pytest.mark.slow)], ids=["push", "all"])
+def test_intervals_hold_the_truth_as_often_as_they_say(poor, bottles, quick, hard, misled):
     """A small form of benchmarks/films.py, of films that other tests estimate."""
-    films = [poor, *bottles, quick, *hard.values()]
+    films = [poor, *bottles, quick, *map(hard, misled)]
     for name in ASKED:
         ends = [(made.truth[name], *judged.estimate.interval(name)) for made, judged in films]
-        assert sum(low <= true <= high for true, low, high in ends) >= len(films) - 2, name
+        assert sum(low <= true <= high for true, low, high in ends) >= len(films) - len(films) // 5, name
 
 
 @pytest.mark.slow
@@ -189,9 +204,11 @@ def test_intervals_hold_the_truth_in_a_dozen_films_of_their_own():
     assert min(held.values()) >= count - 3, held
 
 
-@pytest.mark.parametrize("words", HARD)
+@pytest.mark.parametrize(
+    "words", [pytest.param(words, marks=[pytest.mark.slow] * (words not in PUSHED)) for words in HARD]
+)
 def test_a_film_that_was_once_read_wrongly_is_read_rightly(hard, words):
-    made, judged = hard[words]
+    made, judged = hard(words)
     judged.check()
     assert judged.explained
     for name in ASKED:
@@ -324,6 +341,7 @@ def test_a_bottle_that_stops_at_once_is_not_taken_for_one_on_a_soft_table(quick)
     assert held >= 10
 
 
+@pytest.mark.usefixtures("not_exchanged")
 def test_a_touch_after_which_the_bottle_still_falls_is_refused(quick):
     """Fifteen frames of a flight of 83 were fitted, and said to be explained."""
     made, judged = quick
@@ -490,15 +508,36 @@ def test_a_bad_click_of_each_end_in_two_frames_is_no_jump_of_the_origin(quick):
 
 
 @pytest.mark.xdist_group("test_film_estimate")  # whose films it asks for by name
-@pytest.mark.parametrize("which", ["poor", pytest.param("eq8", marks=pytest.mark.slow)])
-def test_exchanged_ends_are_refused_whatever_flight_is_found_in_them(request, which):
-    """The search would leave the beginning to the hand, and find a late release with a spin far too slow."""
+@pytest.mark.parametrize(
+    ("which", "words"),
+    [
+        ("poor", "with cap and base exchanged the clicks are exp"),
+        pytest.param("eq8", "exchanged", marks=pytest.mark.slow),
+    ],
+)
+def test_exchanged_ends_are_refused_whatever_flight_is_found_in_them(request, which, words, monkeypatch):
+    """The search would leave the beginning to the hand, and find a late release with a spin far too slow.
+
+    What is found with the ends exchanged once more is the estimate that the fixture has.
+    """
     one = request.getfixturevalue(which)[1].estimate
     assert exchange_gain(one, EXCHANGED) < -EXCHANGED
-    with pytest.raises((UnsoundError, NoFlightError), match="exchanged"):
-        Assessment(estimate(exchanged(one.film), THROW)).check()
+
+    def known_film(film, throw, solver, held):
+        np.testing.assert_array_equal(film.values, one.film.values)
+        assert (throw, solver, held) == (one.throw, one.solver, one.held)
+        return one
+
+    def read(film):
+        found = Assessment(estimate(film, THROW))
+        monkeypatch.setattr("flipproof.film.estimate.estimate", known_film)
+        found.check()
+
+    with pytest.raises((UnsoundError, NoFlightError), match=words):
+        read(exchanged(one.film))
 
 
+@pytest.mark.usefixtures("not_exchanged")
 def test_a_flight_that_falls_upwards_in_the_picture_is_refused(quick):
     one = quick[1].estimate
     with pytest.raises(UnsoundError, match="y points up"):
@@ -516,6 +555,7 @@ def test_a_known_table_is_where_the_flight_ends(bottles):
         settle(one.likelihood.replaced(held=Held(table=-50.0)), one.curve, one.fit.x)
 
 
+@pytest.mark.usefixtures("not_exchanged")
 @pytest.mark.parametrize(
     ("changed", "words"),
     [

@@ -345,6 +345,59 @@ def test_the_published_numbers_are_kept_by_whose_they_are():
     assert idle.verdict == IDLE
 
 
+class FromTheFirst(Exact):
+    """theta is counted from the first of the times asked."""
+
+    def solve(self, ask):
+        found = super().solve(ask)
+        return found | {"theta": found["theta"] - found["theta"][0] + ask.scenario.theta0}
+
+
+class TurnsBetweenOutputs(Exact):
+    """The turns of theta are counted from one of the times asked to the next."""
+
+    def solve(self, ask):
+        found = super().solve(ask)
+        return found | {"theta": np.unwrap([ask.scenario.theta0, *np.angle(np.exp(1j * found["theta"]))])[1:]}
+
+
+class ThousandSteps(Exact):
+    """From one of the times asked to the next go a thousand steps at most."""
+
+    def solve(self, ask):
+        before = np.append(0.0, ask.times[:-1])
+        reached = replace(ask, times=np.minimum(ask.times, before + 1000 * ask.effort))
+        return super().solve(ask) | {"theta": super().solve(reached)["theta"]}
+
+
+@pytest.mark.parametrize(
+    ("kind", "advice"),
+    [
+        (FromTheFirst, "theta is still theta_0: the flight begins at t = 0, not at the first of ask.times"),
+        (TurnsBetweenOutputs, "theta is off by whole turns: count them in every step"),
+        (ThousandSteps, "look for a largest number of steps"),
+    ],
+)
+def test_what_goes_from_one_of_the_times_to_the_next_is_told_by_a_flight_asked_at_its_end(kind, advice):
+    line = result_of("angle", kind, refined_by="dt").line
+    assert "asked at its end alone" in line
+    assert advice in line
+
+
+def test_a_rest_that_begins_too_early_is_told_by_the_fastest_that_should_have_bounced():
+    class Resting(Exact):
+        """A slice rests where it would leave an end slower than 0.004 omega_0 L."""
+
+        def solve(self, ask):
+            speed = 0.004 * abs(ask.scenario.omega0) * ask.scenario.bottle.length
+            found = ode_reference.solve(started(ask), self.equation, ask.times, rest_speed=speed)
+            return {name: getattr(found, name) for name in ("t", "theta", "omega", "r", "v")}
+
+    line = result_of("restitution", Resting).line
+    assert "none where a slice would leave the base at 0.003 omega_0 L, 0.017 m/s" in line
+    assert line.endswith("look at the speed below which a slice rests on its end")
+
+
 def test_a_threshold_is_named():
     (result,) = certify(InProcess(MISTAKES["VelocityThreshold"](), "dead"), ["restitution"]).results
     assert result.verdict == FAILED
@@ -776,10 +829,15 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
         ("equal_step_weights", "order-before-impacts", "where output times cut steps unevenly"),
         ("straight_line_across_the_step", "order-before-impacts", "or answer between two steps at the order of the"),
         ("lists_speeds_by_differences", "velocity", "not a slope of r from one of them to the next"),
-        ("unit_vector_unwraps_between_outputs", "angle", "theta is off by whole turns"),
-        ("spins_one_way_released_at_first_output", "angle", "the flight begins at t = 0, not at the first"),
+        *(
+            pytest.param(*each, marks=pytest.mark.slow)
+            for each in (
+                ("unit_vector_unwraps_between_outputs", "angle", "theta is off by whole turns"),
+                ("spins_one_way_released_at_first_output", "angle", "the flight begins at t = 0, not at the first"),
+                ("spin_only_thousand_steps", "angle", "look for a largest number of steps"),
+            )
+        ),
         ("remembered_in_any_order", "inputs", "with another order of the start"),
-        ("spin_only_thousand_steps", "angle", "look for a largest number of steps"),
         ("midpoint_stale_inertia", "definitions", "it is that of the output before"),
         ("by_angle_row_before", "velocity", "r is that of the output before"),
         ("taylor_speed_after", "definitions", "off by 0.5 of the largest speed"),
@@ -866,7 +924,12 @@ def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, 
             "or for single precision; of that order",
         ),
         ("collocation_root_truncated", "order-before-impacts", "look for a constant of few digits"),
-        ("expint_rests_too_early", "restitution", "where a slice would leave the cap at 0.004 omega_0 L"),
+        pytest.param(
+            "expint_rests_too_early",
+            "restitution",
+            "where a slice would leave the cap at 0.004 omega_0 L",
+            marks=pytest.mark.slow,
+        ),
         pytest.param(
             "series_rests_too_soon",
             "restitution",

@@ -12,8 +12,9 @@ from planted import InProcess
 from planted.ours import MISTAKES
 from planted.subject import Subject
 
+import ode_reference
 from flipproof.chapters.solvers import LIMITS
-from flipproof.foreign.contract import ForeignError
+from flipproof.foreign.contract import ForeignError, started
 from flipproof.foreign.place import explain, lattice, name_of, place, shares, switches_of
 from flipproof.foreign.solving import opened
 from flipproof.frame.solvers import RunResult, catalogue
@@ -85,10 +86,35 @@ def test_wrong_constants_of_another_solver_are_off_the_lattice(name):
     assert "restitution, drag, mass or gravity" in found.advice
 
 
-@pytest.mark.parametrize("name", ["RestitutionLow", "DragFivePercent", "ElasticCap", "StickForEver"])
+class OtherConstants:
+    """The reference of free flight, thrown with other constants than those asked."""
+
+    equation, refined_by = "free-flight", "dt"
+
+    def __init__(self, **factors):
+        self.factors = factors
+
+    def solve(self, ask):
+        throw = started(ask)
+        other = replace(throw, **{name: factor * getattr(throw, name) for name, factor in self.factors.items()})
+        found = ode_reference.solve(other, self.equation, ask.times)
+        return {name: getattr(found, name) for name in ("t", "theta", "omega")}
+
+
+WRONG = {
+    "restitution": lambda: OtherConstants(restitution=0.9),
+    "drag": lambda: OtherConstants(drag=1.05),
+    **{name: MISTAKES[name] for name in ("RestitutionLow", "DragFivePercent", "ElasticCap", "StickForEver")},
+}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name in ("RestitutionLow", "DragFivePercent"))) for name in WRONG],
+)
 def test_wrong_constants_impacts_and_rests_are_off_the_lattice(name):
     """Impacts change omega(t) little where drag is strong; one throw is there for them."""
-    found = place(InProcess(MISTAKES[name](), name))
+    found = place(InProcess(WRONG[name](), name))
     assert (found.equation, found.on_lattice) in {("free-flight", False), ("switches:110011", False)}
     assert found.distance > 5 * found.room
     assert "off the lattice" in found.text
