@@ -127,11 +127,8 @@ def test_tests_that_share_a_fixture_are_kept_in_one_process(request):
     assert request.node.nodeid.endswith("@test_architecture") == grouped
 
 
-def test_the_frame_knows_no_subject_and_chapters_are_named_once():
-    """What drives chapters imports none; each chapter of the contents is a folder of its own, and each folder one."""
-    for file in sorted((folder_of("flipproof") / "frame").glob("*.py")):
-        for module, _ in imports_of(file):
-            assert not module.startswith("flipproof.chapters"), f"{file} imports {module}"
+def test_chapters_are_named_once():
+    """Each chapter of the contents is a folder of its own, and each folder one."""
     from flipproof.chapters import CONTENTS
 
     named = [name for *_, names in CONTENTS for name in names]
@@ -219,10 +216,3 @@ def test_no_circle_of_files():
 
     circles = {module for module in graph if module in reach(module)}
     assert not circles, "two files that need one another are one file, or share a third below them"
-
-
-def test_the_frame_knows_no_guest_and_output_no_sweep():
-    for room, forbidden in (("frame", ("foreign", "bounce")), ("output", ("sweep",))):
-        for module, imports in rooms_of_reports().items():
-            if module.partition(".")[0] == room:
-                assert not {other for other in imports if other.partition(".")[0] in forbidden}, module
