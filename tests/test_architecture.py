@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -107,12 +108,29 @@ def test_nouns_know_no_verb():
                 assert module.partition(".")[2] in NOUNS, f"{noun} imports {module} {names}"
 
 
-def test_start_up_is_light():
-    heavy = {"numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"}
-    code = "import sys, slicemodel, ode_reference, engine_check, flipproof.cli.main; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True).stdout
-    assert "flipproof.cli.main" in loaded.split()
-    assert heavy.isdisjoint(loaded.split()), heavy.intersection(loaded.split())
+LIGHT = {
+    "import slicemodel, ode_reference, engine_check, flipproof.cli.main": {
+        "numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"
+    },
+    "from ode_reference import solve, solve_batch": {"numba"},
+    "from engine_check import solve, PymunkKnobs": {"pymunk", "mujoco"},
+    "import slicemodel as s; repr(s.solve(s.Scenario(n_slices=2), steps=5))": {"matplotlib"},
+    "import flipproof.pytest_plugin": {"numpy", "flipproof.foreign"},
+}  # fmt: skip
+"""Statement -> what it may not load."""
+
+
+@pytest.mark.parametrize("statement", LIGHT)
+def test_start_up_is_light(statement):
+    code = f"import sys; {statement}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True)
+    assert not LIGHT[statement] & set(done.stdout.split())
+
+
+@pytest.mark.parametrize("room", ROOMS[:3])
+def test_an_unknown_export_is_an_attribute_error(room):
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        _ = import_module(room).nothing
 
 
 @pytest.fixture(scope="module")
