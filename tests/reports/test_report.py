@@ -188,7 +188,9 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, gathered, re
     assert "regression claims hold." in out
     assert str(folder / "index.html") in out
     pages = {file: read_page((folder / file).read_text(encoding="utf-8")) for file in ("index.html", "evidence.html")}
+    assert any(link.startswith("evidence.html#") for link in pages["index.html"].links)
     for file, page in pages.items():
+        assert len(page.ids) == len(set(page.ids))
         for link in page.links:
             target, _, place = link.partition("#")
             assert (folder / (target or file)).is_file(), link
@@ -203,6 +205,7 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, gathered, re
     assert {figure["name"] for figure in summary["figures"]} == names
     for figure in summary["figures"]:
         assert all((folder / figure[kind]).is_file() for kind in kinds)
+        assert {figure[kind] for kind in kinds} <= set(pages["evidence.html"].links)
         assert png or figure["png"] is None
     assert (folder / summary["$schema"]).is_file()
     assert (folder / "junit.xml").is_file()
