@@ -9,11 +9,8 @@ import pickle
 import re
 import subprocess
 import sys
-import threading
-import time
 import warnings
 import xml.etree.ElementTree as ElementTree
-from concurrent.futures import Executor, Future
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -21,7 +18,7 @@ import matplotlib
 import numpy as np
 import pytest
 from jsonschema import validate
-from made_up import is_number, spoiled
+from made_up import LastComesFirst, is_number, spoiled
 
 from flipproof import build as build_module
 from flipproof.chapters.differences.chapter import PAIRS
@@ -296,30 +293,11 @@ def test_workers_bring_home_the_same_trajectory():
     assert away.settings == here.settings
 
 
-class LastFirst(Executor):
-    """Finishes the jobs it is given in reverse, once it has as many as it waits for."""
-
-    def __init__(self, jobs):
-        self.jobs, self.waiting = jobs, []
-
-    def submit(self, function, *arguments):
-        future = Future()
-        self.waiting.append((future, function, arguments))
-        if len(self.waiting) == self.jobs:
-            threading.Thread(target=self._finish).start()
-        return future
-
-    def _finish(self):
-        for future, function, arguments in reversed(self.waiting):
-            future.set_result(function(*arguments))
-            time.sleep(0.02)
-
-
 def test_results_stand_in_the_order_asked_whichever_worker_is_faster(monkeypatch):
     """A step must never be paired with the drift of another: what is read off this table is read in order."""
     monkeypatch.setattr(pool, "GROUP", 1)
     runs = [Run("eq8", Scenario(n_slices=n, duration=0.02), label=f"{n}") for n in (1, 2, 3)]
-    made, _ = make_all(LastFirst(3), runs, lambda *_: None)
+    made, _ = make_all(LastComesFirst(), runs, lambda *_: None)
     assert list(made) == runs
     assert [result.run.label for result in made.values()] == ["1", "2", "3"]
 
