@@ -1,5 +1,6 @@
 """Flights that were not made: trajectories as told, runs answered from a table, reports some of whose runs failed."""
 
+import threading
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future
@@ -45,6 +46,12 @@ def trajectory_of(scenario: Scenario, t=None, *, keeps_slices=False, **told) -> 
     r = fields.setdefault("r", np.full((len(t) if keeps_slices else 0, scenario.n_slices), 0.1))
     fields.setdefault("v", np.zeros_like(r))
     return Trajectory(scenario=scenario, t=t, **fields)
+
+
+def flat(run: Run, level: float, **told) -> RunResult:
+    """Return a run whose omega jumps from omega_0 to a level at once, at the times or steps that it was asked for."""
+    t = run.settings.get("times", run.settings.get("steps", 201))
+    return RunResult(run, trajectory_of(run.scenario, t, omega=level * run.scenario.omega0, **told), 0.0)
 
 
 def command(capsys, *arguments):
@@ -114,6 +121,26 @@ class Exact:
         flight = ode_reference.solve(self.thrown(throw), self.equation, ask.times)
         names = ("t", "theta", "omega", "r", "v", "r_cm", "inertia")
         return self.spoilt(throw, {name: getattr(flight, name).copy() for name in names})
+
+
+class LastComesFirst(Executor):
+    """Answers every call at once but the first, which is answered when the others are."""
+
+    def __init__(self, call=lambda function, *arguments: function(*arguments)) -> None:
+        self.call, self.asked = call, 0
+
+    def submit(self, *asked) -> Future:
+        answer = Future()
+
+        def make():
+            answer.set_result(self.call(*asked))
+
+        self.asked += 1
+        if self.asked == 1:
+            threading.Timer(0.5, make).start()
+        else:
+            make()
+        return answer
 
 
 class Answers(Executor):

@@ -4,6 +4,7 @@ import ast
 import subprocess
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -107,12 +108,29 @@ def test_nouns_know_no_verb():
                 assert module.partition(".")[2] in NOUNS, f"{noun} imports {module} {names}"
 
 
-def test_start_up_is_light():
-    heavy = {"numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"}
-    code = "import sys, slicemodel, ode_reference, engine_check, flipproof.cli.main; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True).stdout
-    assert "flipproof.cli.main" in loaded.split()
-    assert heavy.isdisjoint(loaded.split()), heavy.intersection(loaded.split())
+LIGHT = {
+    "import slicemodel, ode_reference, engine_check, flipproof.cli.main": {
+        "numba", "scipy", "matplotlib", "pymunk", "mujoco", "jinja2", "numpy"
+    },
+    "from ode_reference import solve, solve_batch": {"numba"},
+    "from engine_check import solve, PymunkKnobs": {"pymunk", "mujoco"},
+    "import slicemodel as s; repr(s.solve(s.Scenario(n_slices=2), steps=5))": {"matplotlib"},
+    "import flipproof.pytest_plugin": {"numpy", "flipproof.foreign"},
+}  # fmt: skip
+"""Statement -> what it may not load."""
+
+
+@pytest.mark.parametrize("statement", LIGHT)
+def test_start_up_is_light(statement):
+    code = f"import sys; {statement}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True)
+    assert not LIGHT[statement] & set(done.stdout.split())
+
+
+@pytest.mark.parametrize("room", ROOMS[:3])
+def test_an_unknown_export_is_an_attribute_error(room):
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        _ = import_module(room).nothing
 
 
 @pytest.fixture(scope="module")
@@ -127,11 +145,8 @@ def test_tests_that_share_a_fixture_are_kept_in_one_process(request):
     assert request.node.nodeid.endswith("@test_architecture") == grouped
 
 
-def test_the_frame_knows_no_subject_and_chapters_are_named_once():
-    """What drives chapters imports none; each chapter of the contents is a folder of its own, and each folder one."""
-    for file in sorted((folder_of("flipproof") / "frame").glob("*.py")):
-        for module, _ in imports_of(file):
-            assert not module.startswith("flipproof.chapters"), f"{file} imports {module}"
+def test_chapters_are_named_once():
+    """Each chapter of the contents is a folder of its own, and each folder one."""
     from flipproof.chapters import CONTENTS
 
     named = [name for *_, names in CONTENTS for name in names]
@@ -219,10 +234,3 @@ def test_no_circle_of_files():
 
     circles = {module for module in graph if module in reach(module)}
     assert not circles, "two files that need one another are one file, or share a third below them"
-
-
-def test_the_frame_knows_no_guest_and_output_no_sweep():
-    for room, forbidden in (("frame", ("foreign", "bounce")), ("output", ("sweep",))):
-        for module, imports in rooms_of_reports().items():
-            if module.partition(".")[0] == room:
-                assert not {other for other in imports if other.partition(".")[0] in forbidden}, module

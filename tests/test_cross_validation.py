@@ -8,10 +8,9 @@ import pytest
 import engine_check
 import ode_reference
 import slicemodel
-from flipproof.chapters.ice.chapter import ADMISSIBLE
 from flipproof.chapters.solvers import LIMITS, SCHEMES
 from flipproof.chapters.step_size.chapter import before_first_impact, claim_order, plan_step_size, study_step_size
-from slicemodel import Bottle, Scenario, observables
+from slicemodel import Bottle, Scenario
 
 # Other bottles, fillings, angles, spins and restitutions; each shifts the phase of every impact.
 THROWS = {
@@ -131,49 +130,6 @@ def test_a_scheme_does_not_converge_to_the_other_equation(scheme):
     other = next(LIMITS[each] for each in SCHEMES if each != scheme)
     study = refine(throw, scheme, other, 220, 4)
     assert claim_order(study, "here").failed
-
-
-def test_all_three_start_from_the_same_state():
-    throw = THROWS["small bottle"]
-    runs = [slicemodel.solve(throw), ode_reference.solve(throw), engine_check.solve(throw, dt=engine_check.DEFAULT_DT)]
-    for run in runs:
-        np.testing.assert_allclose(run.r[0], throw.initial_positions(), rtol=0, atol=1e-12)
-        assert run.theta[0] == pytest.approx(throw.theta0, rel=1e-12, abs=0.0)
-        assert run.omega[0] == pytest.approx(throw.omega0, rel=1e-6, abs=0.0)
-        assert run.r_cm[0] == pytest.approx(float(observables.centre_of_mass(throw, throw.initial_positions())))
-        assert run.inertia[0] == pytest.approx(observables.initial_moment_of_inertia(throw), rel=1e-12, abs=0.0)
-
-
-@pytest.mark.arithmetic
-def test_own_formulas_of_every_package_agree_with_the_shared_definitions():
-    throw = THROWS["fuller, softer"]
-    for run in (
-        slicemodel.solve(throw),
-        ode_reference.solve(throw),
-        engine_check.solve(throw, dt=engine_check.DEFAULT_DT),
-    ):
-        np.testing.assert_allclose(run.r_cm, observables.centre_of_mass(throw, run.r), rtol=1e-6)
-        np.testing.assert_allclose(run.inertia, observables.moment_of_inertia(throw, run.r), rtol=1e-5)
-
-
-def test_without_gravity_drag_and_water_motion_all_three_turn_alike():
-    """A tube so heavy that nothing inside matters: omega stays omega_0 in all three until round-off or drift."""
-    throw = Scenario(bottle=Bottle(mass=1e6), n_slices=3, gravity=0.0, drag=0.0, duration=0.1)
-    for run in (
-        slicemodel.solve(throw),
-        ode_reference.solve(throw),
-        engine_check.solve(throw, dt=engine_check.DEFAULT_DT),
-    ):
-        np.testing.assert_allclose(run.omega, throw.omega0, rtol=1e-6)
-
-
-@pytest.mark.parametrize("solver", ["slicemodel", "ode_reference", "engine_check"])
-def test_ice_in_every_package(solver):
-    ice = Scenario(n_slices=20, frozen=True)
-    module = {"slicemodel": slicemodel, "ode_reference": ode_reference, "engine_check": engine_check}[solver]
-    run = module.solve(ice, **({"dt": engine_check.DEFAULT_DT} if module is engine_check else {}))
-    assert np.abs(run.omega / ice.omega0 - 1).max() <= ADMISSIBLE[solver]
-    np.testing.assert_allclose(run.theta, ice.theta0 + ice.omega0 * run.t, rtol=1e-9)
 
 
 def test_the_models_that_move_a_bottle_agree_before_anything_can_differ():

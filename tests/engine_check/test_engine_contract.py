@@ -78,6 +78,7 @@ def test_the_mirror_throw_is_the_mirror_image(fly, scenario):
     np.testing.assert_allclose(mirror.r, run.r, rtol=1e-9)
 
 
+@pytest.mark.arithmetic
 def test_its_bulk_quantities_are_those_of_the_shared_definitions(fly):
     run = fly(TEN)
     within = 1e-9 if run.method == "pymunk" else 1e-12

@@ -75,6 +75,7 @@ def test_no_loss_and_no_drag_keep_the_energy_over_many_impacts():
     scenario = replace(Scenario(water_mass=0.98, duration=2.0).with_slices(100), drag=0.0, restitution=1.0)
     flight = solve(scenario, "free-flight", [2.0], rest_speed=1e-8, energy=True)
     ledger = flight.diagnostics["energy"]
+    assert flight.ok
     assert len(flight.impacts) > 1500
     assert abs(ledger["final"] / ledger["initial"] - 1) < 1e-12
     assert abs(ledger["residual"]) < 1e-12 * ledger["initial"]

@@ -17,11 +17,6 @@ CODE = (
 )
 
 
-def test_asking_for_the_verb_does_not_load_numba():
-    code = "from ode_reference import solve, solve_batch; import sys; sys.exit('numba' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 @pytest.mark.slow
 def test_a_change_in_a_helper_is_compiled_anew(tmp_path):
     for room in ("ode_reference", "slicemodel"):

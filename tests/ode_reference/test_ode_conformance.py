@@ -168,8 +168,3 @@ def test_bad_arguments_are_refused_by_name_value_and_range(arguments, words):
         solve(**{"scenario": SMALL} | arguments)
     for word in words:
         assert word in str(caught.value)
-
-
-def test_unknown_attribute_is_an_attribute_error():
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        ode_reference.nothing  # noqa: B018

@@ -50,7 +50,7 @@ def assert_law_of_newton_and_moreau(x, side, e, ratio):
     loss = kinetic(x, side, 0.0, ratio) - kinetic(after, side, gained, ratio)
     p = solutions[0]
     expected = (1 - e) / (1 + e) * 0.5 * ((p**2).sum() + ratio * (side * p).sum() ** 2)
-    assert loss == pytest.approx(expected, rel=1e-9, abs=1e-11 * (1 + (x**2).sum()))
+    assert loss == pytest.approx(expected, rel=1e-9, abs=3e-13 * (1 + (x**2).sum()))
 
 
 FIXED = [
@@ -87,12 +87,6 @@ def test_one_slice_alone_is_the_textbook_impact():
     after, gained = simultaneous(np.array([2.0]), np.array([-1]), 0.5, 0.4)
     assert after[0] == -1.0
     assert gained == pytest.approx(-2.0 * 1.5 / (1 + 1 / 0.4), rel=1e-15, abs=0.0)
-
-
-def test_elastic_exchange_conserves_energy():
-    x, side = np.array([1.3, 0.0, 0.2]), np.array([1, -1, -1])
-    after, gained = simultaneous(x, side, 1.0, 1.7)
-    assert kinetic(after, side, gained, 1.7) == pytest.approx(kinetic(x, side, 0.0, 1.7), rel=1e-12, abs=0.0)
 
 
 # ---------------------------------------------------------------------- the contacts of one instant

@@ -80,8 +80,3 @@ def test_ids_are_searched_for_repetitions_in_linear_time(tmp_path, monkeypatch):
     CountedId.compared = 0
     read_summary(path)
     assert CountedId.compared < 10 * count
-
-
-def test_a_repeated_id_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="'twice'"):
-        read_summary(summary(tmp_path / "a.json", [finding("once", 0.0), finding("twice", 0.0), finding("twice", 1.0)]))

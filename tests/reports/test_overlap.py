@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up import trajectory_of
+from made_up import flat
 
 from flipproof.chapters.overlap.chapter import (
     CHECK,
@@ -26,12 +26,6 @@ from slicemodel.observables import plateau
 
 THROW = Scenario().with_slices(50)
 FILLS = (0.5, 1.0)
-
-
-def flat(run, level, status="ok", message=""):
-    """A run whose omega is a level of omega_0 from the start."""
-    told = {"omega": level * run.scenario.omega0, "status": status, "message": message}
-    return RunResult(run, trajectory_of(run.scenario, run.settings["times"], **told), 0.0)
 
 
 LEVELS = {
@@ -82,7 +76,7 @@ def test_a_failure_keeps_its_reason_and_leaves_a_gap():
         of = {run.label: run for run in made}
         failed, burst = of[f"overlap, {PASS}, fill 0.5"], of[f"overlap, {EXCLUDE}, fill 1"]
         made[failed] = RunResult(failed, None, 0.0, "SetupError: not the one meant")
-        made[burst] = flat(burst, 0.9, "diverged", "overlap 0.02 exceeds 0.01")
+        made[burst] = flat(burst, 0.9, status="diverged", message="overlap 0.02 exceeds 0.01")
 
     study = made_up(spoil)
     assert study.reason[PASS] == ["SetupError: not the one meant", ""]

@@ -57,14 +57,6 @@ def test_every_entry_says_where_it_comes_from():
         assert entry.source != CHOSEN or entry.doubt, entry.name
 
 
-def test_the_table_of_words_is_whole():
-    rows = cases.parameter_rows()
-    assert len(rows) == len(PARAMETERS)
-    assert {len(row) for row in rows} == {len(cases.HEADER)}
-    (angles,) = (row for row in rows if row[0] == "figure-8b-angle")
-    assert angles[2:4] == ("0, 0.5236, 1.0472, 1.5708, 2.0944", "rad")
-
-
 def test_a_case_is_one_throw_that_is_kept_as_every_family_needs_it():
     every = [case for members in FAMILIES.values() for case in members]
     throws = {(case.scenario, case.steps, case.slices_vary) for case in every}
@@ -228,8 +220,3 @@ def test_the_examples_are_the_papers_throws():
         assert second == "# Every key may be left out. SI units; alpha is drag, beta is -restitution."
         assert text.lstrip() == all_cases()[key].scenario.to_toml()
         assert Scenario.from_toml(files[name]) == all_cases()[key].scenario
-
-
-def test_parameters_cannot_be_changed():
-    with pytest.raises(TypeError):
-        cases.PARAMETERS["drag"] = PARAMETERS["length"]

@@ -9,11 +9,8 @@ import pickle
 import re
 import subprocess
 import sys
-import threading
-import time
 import warnings
 import xml.etree.ElementTree as ElementTree
-from concurrent.futures import Executor, Future
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -21,7 +18,7 @@ import matplotlib
 import numpy as np
 import pytest
 from jsonschema import validate
-from made_up import is_number, spoiled
+from made_up import LastComesFirst, is_number, spoiled
 
 from flipproof import build as build_module
 from flipproof.chapters.differences.chapter import PAIRS
@@ -188,7 +185,9 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, gathered, re
     assert "regression claims hold." in out
     assert str(folder / "index.html") in out
     pages = {file: read_page((folder / file).read_text(encoding="utf-8")) for file in ("index.html", "evidence.html")}
+    assert any(link.startswith("evidence.html#") for link in pages["index.html"].links)
     for file, page in pages.items():
+        assert len(page.ids) == len(set(page.ids))
         for link in page.links:
             target, _, place = link.partition("#")
             assert (folder / (target or file)).is_file(), link
@@ -203,6 +202,7 @@ def test_the_folder_holds_everything(monkeypatch, capsys, tmp_path, gathered, re
     assert {figure["name"] for figure in summary["figures"]} == names
     for figure in summary["figures"]:
         assert all((folder / figure[kind]).is_file() for kind in kinds)
+        assert {figure[kind] for kind in kinds} <= set(pages["evidence.html"].links)
         assert png or figure["png"] is None
     assert (folder / summary["$schema"]).is_file()
     assert (folder / "junit.xml").is_file()
@@ -293,30 +293,11 @@ def test_workers_bring_home_the_same_trajectory():
     assert away.settings == here.settings
 
 
-class LastFirst(Executor):
-    """Finishes the jobs it is given in reverse, once it has as many as it waits for."""
-
-    def __init__(self, jobs):
-        self.jobs, self.waiting = jobs, []
-
-    def submit(self, function, *arguments):
-        future = Future()
-        self.waiting.append((future, function, arguments))
-        if len(self.waiting) == self.jobs:
-            threading.Thread(target=self._finish).start()
-        return future
-
-    def _finish(self):
-        for future, function, arguments in reversed(self.waiting):
-            future.set_result(function(*arguments))
-            time.sleep(0.02)
-
-
 def test_results_stand_in_the_order_asked_whichever_worker_is_faster(monkeypatch):
     """A step must never be paired with the drift of another: what is read off this table is read in order."""
     monkeypatch.setattr(pool, "GROUP", 1)
     runs = [Run("eq8", Scenario(n_slices=n, duration=0.02), label=f"{n}") for n in (1, 2, 3)]
-    made, _ = make_all(LastFirst(3), runs, lambda *_: None)
+    made, _ = make_all(LastComesFirst(), runs, lambda *_: None)
     assert list(made) == runs
     assert [result.run.label for result in made.values()] == ["1", "2", "3"]
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up import study_map, trajectory_of
+from made_up import flat, study_map
 
 import ode_reference
 from flipproof.chapters.maps.chapter import _beyond, _regions, _thrown_words, claims, figure_map, figures
@@ -26,19 +26,13 @@ from flipproof.chapters.waterfall.study import STEP
 from flipproof.figures.style import draw
 from flipproof.frame.equations import NAMES
 from flipproof.frame.flights import Outcome
-from flipproof.frame.solvers import Run, RunResult, make
+from flipproof.frame.solvers import RunResult, make
 from slicemodel import Scenario
 from slicemodel.observables import plateau
 
 THROW = Scenario().with_slices(6)
 FILLS = (0.3, 0.6)
 DRAG, SIGNS, ORIGIN = (NAMES[switch] for switch in ("drag_on_centre", "signs", "origin"))
-
-
-def flat(run: Run, level: float, status: str = "ok") -> RunResult:
-    """A run whose omega jumps from omega_0 to a level at once."""
-    points = run.settings.get("steps", 201)
-    return RunResult(run, trajectory_of(run.scenario, points, omega=level * run.scenario.omega0, status=status), 0.0)
 
 
 def made_up(axis, values, level_of, spoil=None):
@@ -173,7 +167,7 @@ def test_a_cell_that_could_not_be_computed_carries_its_reason_and_no_colour():
     runs = {run.label: run for run in plan_map(THROW, "gamma", FILLS, values)}
     stalled, failed = "map gamma, row 0, column 1, free-flight", "map gamma, row 1, column 0, eq8"
     spoil = {
-        runs[stalled]: flat(runs[stalled], 0.5, "stalled"),
+        runs[stalled]: flat(runs[stalled], 0.5, status="stalled"),
         runs[failed]: RunResult(runs[failed], None, 0.0, "MemoryError: too much"),
     }
     study = made_up("gamma", values, by_rung(4), spoil)

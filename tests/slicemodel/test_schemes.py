@@ -37,6 +37,7 @@ def test_conformance(scheme):
     )
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize("scheme", [s for s in KEEPS_SLICES_INSIDE if s != "published-python"])
 def test_definitions_agree_with_the_observables(scheme):
     trajectory = slicemodel.solve(SMALL, scheme, steps=301)

@@ -1,8 +1,6 @@
 """The one result object: shapes, honesty, immutability; its line, table, plot, and tables for pandas and xarray."""
 
 import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -117,12 +115,6 @@ def test_plot_draws_into_given_or_new_axes():
     assert SHORT.plot(axes) is axes
     assert [len(line.get_xdata()) for line in axes.lines] == [11, 11]
     assert axes.get_ylabel() == "omega [rad/s]"
-
-
-def test_matplotlib_is_loaded_by_plot_alone():
-    code = "import slicemodel as s, sys; repr(s.solve(s.Scenario(n_slices=2), steps=5));"
-    code += "sys.exit('matplotlib' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_to_pandas():

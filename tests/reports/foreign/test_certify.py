@@ -750,16 +750,6 @@ def test_the_good_solver_is_free_flight():
     np.testing.assert_allclose(found.omega, solve("free-flight", throw, times=t).omega, rtol=1e-9)
 
 
-def test_there_are_at_least_120_mistakes_and_each_says_what_it_is():
-    first = patches("first")
-    assert len(MISTAKES) + len(ASKED) + len(first) >= 120
-    assert not set(MISTAKES) & set(ASKED)
-    assert all(kind.__doc__.endswith(".") for kind in [*MISTAKES.values(), *ASKED.values()])
-    for mistake in first.values():
-        assert mistake.words.endswith(".")
-        assert callable(mistake.solver())
-
-
 ASKED_FIRST = {
     "ThetaFromZero": "start",
     "OmegaLate": "angular-momentum",

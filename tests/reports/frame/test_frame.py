@@ -1,12 +1,10 @@
 """What drives chapters: waves, equal runs made once, what is missing, in what order all of it stands."""
 
 import dataclasses
-import threading
-from concurrent.futures import Executor, Future
 
 import numpy as np
 import pytest
-from made_up import Answers
+from made_up import Answers, LastComesFirst, trajectory_of
 
 from flipproof.build import ask_of
 from flipproof.frame.chapter import Chapter, Part, judged
@@ -16,7 +14,7 @@ from flipproof.frame.flights import Call, ChapterError, attempt
 from flipproof.frame.gather import evaluate, gather
 from flipproof.frame.pool import SerialExecutor
 from flipproof.frame.solvers import Missing, Run, RunResult
-from slicemodel import Scenario, Trajectory
+from slicemodel import Scenario
 
 THROW = Scenario(n_slices=2)
 ASK = dataclasses.replace(ask_of(THROW, "quick"), solvers={})
@@ -29,13 +27,7 @@ def fly(run, omega=10.0):
     if run == LOST:
         return RunResult(run, None, 0.0, "RuntimeError: no luck")
     t = np.linspace(0.0, THROW.duration, 3)
-    none = np.zeros((0, 2))
-    flat = np.full(3, omega)
-    flight = Trajectory(
-        scenario=run.scenario, solver="made-up", method=run.solver, t=t, theta=t, omega=flat, r=none, v=none,
-        r_cm=np.full(3, 0.1), inertia=np.ones(3),
-    )  # fmt: skip
-    return RunResult(run, flight, 0.1)
+    return RunResult(run, trajectory_of(run.scenario, t, method=run.solver, theta=t, omega=omega), 0.1)
 
 
 def value(id_, number, kind="observation"):
@@ -192,27 +184,12 @@ def test_a_mistake_of_the_program_is_no_evidence_that_is_missing(part, place):
 
 def test_a_figure_counts_as_soon_as_it_is_drawn():
     """Whatever stands first on the page; the bar of a report moves with it."""
-
-    class LastComesFirst(Executor):
-        """Makes every call at once but the first, which is answered when the others are."""
-
-        first = None
-
-        def submit(self, *_, **__):
-            answer = Future()
-            if self.first is None:
-                self.first = answer
-                threading.Timer(0.5, answer.set_result, [None]).start()
-            else:
-                answer.set_result(None)
-            return answer
-
     figures = [
         Exhibit(name=name, title="", caption="", alt="", maker=dict, data=(), table=table)
         for name, table in (("long", "1,2,3"), ("b", "1"), ("c", "1"))
     ]
     shown = []
-    made = drawn(figures, LastComesFirst(), lambda count, planned, name: shown.append((count, planned, name)))
+    made = drawn(figures, LastComesFirst(lambda *_: None), lambda *told: shown.append(told))
     assert [figure.name for figure in made] == ["long", "b", "c"]
     assert [(count, planned) for count, planned, _ in shown] == [(1, 3), (2, 3), (3, 3)]
     assert shown[-1][2] == "long"
