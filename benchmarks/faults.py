@@ -107,7 +107,7 @@ FAULTS = (
     ("reports/flipproof/foreign/checks_measured.py", "if holds := orders[worst] >= required:",
      "if holds := orders[worst] <= declared + ORDER_ROOM:", "foreign/test_certify.py"),
     ("reports/flipproof/foreign/departures.py", "count < FEW or np.median(sizes) > EXACT", "count < 99",
-     "foreign/test_certify.py"),
+     "foreign/test_departures.py"),
     ("reports/flipproof/film/judge.py", "velocities[:, 1] - (velocities[:, 0] + velocities[:, 2]) / 2",
      "velocities[:, 1]", "film/test_film_estimate.py"),
     ("reports/flipproof/frame/twins.py", '{"twin": k}', '{"twin": 1}', "test_waterfall.py"),
