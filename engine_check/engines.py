@@ -184,10 +184,13 @@ def _checked_step(dt: object, end: float) -> float:
         raise ValueError(f"{error}: an engine makes at most {MAX_STEPS:g} steps, here of {end:g} s in all") from None
 
 
-def _checked_iterations(iterations: object) -> int | None:
-    if iterations is not None and (problem := not_whole("iterations", iterations, 1, MAX_ITERATIONS)):
+def _checked_iterations(iterations: int | None) -> int | None:
+    """Return a plain int, also of NumPy's, which no settings could be written with; None for the engine's own rule."""
+    if iterations is None:
+        return None
+    if problem := not_whole("iterations", iterations, 1, MAX_ITERATIONS):
         raise ValueError(problem)
-    return iterations  # type: ignore[return-value]
+    return int(iterations)
 
 
 def knobs_from(kind: type[Knobs], overrides: Mapping[str, float]) -> Knobs:

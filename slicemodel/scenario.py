@@ -169,7 +169,10 @@ def number_in(
     admissible = f"{'(' if open_low else '['}{low:g}, {high:g}{')' if open_high else ']'}{unit}"
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise ValueError(f"{name} = {shown(value)} is not a number (admissible: {admissible})")
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
     # Written as "not inside", because NaN passes every "outside" test.
     inside = (low < number if open_low else low <= number) and (number < high if open_high else number <= high)
     if not inside:

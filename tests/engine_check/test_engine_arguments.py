@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from engine_check import DEFAULT_DT, ENGINES, PymunkKnobs, certify, solve
@@ -23,7 +24,10 @@ EXCLUDE = {"slices": "exclude", "dt": DEFAULT_DT}
         ({"engine": "xyz"}, "known: pymunk"),
         ({"slices": "exclud"}, r"slices = 'exclud' is unknown; did you mean 'exclude'\?"),
         ({"ice": "weld"}, r"ice = 'weld' is unknown; did you mean 'welded'\?"),
-        *(({"dt": dt}, r"dt = .* s is outside \(1e-11, inf\) s") for dt in (0.0, -1e-4, math.nan, math.inf, 1e-12)),
+        *(
+            ({"dt": dt}, r"dt = .* s is outside \(1e-11, inf\) s")
+            for dt in (0.0, -1e-4, math.nan, math.inf, 1e-12, 10**400)
+        ),
         *(({"dt": dt}, r"dt = .* is not a number") for dt in ("1e-4", True)),
         *(
             ({"iterations": iterations}, r"iterations = .* is not a whole number in \[1, 1000000\]")
@@ -106,6 +110,12 @@ def test_dt_may_exceed_the_flight():
     short = solve(replace(THROW, duration=5e-5), times=[0.0, 5e-5], dt=DEFAULT_DT)
     assert short.ok
     assert short.settings["step"] == pytest.approx(5e-5)
+
+
+def test_iterations_of_numpy_are_stated_as_a_plain_number():
+    settings = solve(THROW, dt=DEFAULT_DT, iterations=np.int64(30)).settings
+    assert type(settings["iterations"]) is int
+    assert settings["iterations"] == 30
 
 
 def test_iterations_grow_with_mass_ratio_and_slices_and_are_stated():
