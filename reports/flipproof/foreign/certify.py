@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
@@ -15,7 +14,6 @@ import numpy as np
 from flipproof.foreign import checks_basic, checks_measured, elsewhere
 from flipproof.foreign.checking import Check, NotApplicableError, Observation, drive
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
-from flipproof.foreign.likeness.mistakes import naming
 from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
@@ -60,11 +58,6 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
 
 A new check is one generator and one line here.
 """
-
-OF_MOTION: Final = frozenset(
-    ("piecewise", "angular-momentum", "angle", "restitution", "equation", "gravity", "mirror", "elsewhere")
-)
-"""Checks that may fail because of a known mistake; if one gives the same answers, their advice names it."""
 
 ENOUGH: Final = "enough"
 """The last line of the whole suite: whether at least half of the checks could run."""
@@ -193,7 +186,6 @@ class _Recorder(Runner):
     def __init__(self, runner: Runner) -> None:
         self.runner, self.traits = runner, runner.traits
         self.answers: dict[tuple[Any, ...], Answer] = {}
-        self.named: tuple[str, bool] | None = None
         self.domain: dict[str, tuple[float, float]] = {}
 
     def __call__(self, ask: Ask) -> Answer:
@@ -272,25 +264,11 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
         return result(verdict=FAILED, observation=observation, reason=f"declared as a failure ({reason}), but holds")
     if observation.holds:
         return result(verdict=WEAK if observation.weak else PASSED, observation=observation)
-    if name in OF_MOTION or observation.moved:
-        named, explained = _named(traits, recorder)
-        # What explains some throws alone stands beside the advice, what explains all in its place.
-        beside = [] if explained else [observation.advice]
-        observation = replace(observation, advice="; ".join(filter(None, [named, *beside])))
     return result(
         verdict=FAILED if reason is None else EXPECTED,
         observation=observation,
         reason=f"known: {reason}" if reason else "",
     )
-
-
-def _named(traits: Traits, recorder: _Recorder) -> tuple[str, bool]:
-    """Return what ``naming`` says of a solver. It is sought once."""
-    if recorder.named is None:
-        recorder.named = "", False
-        with suppress(WaitingError):  # nobody is asked to write more answers for an advice
-            recorder.named = drive(naming(traits), recorder)
-    return recorder.named
 
 
 def _coverage(results: Iterable[Result]) -> Result:

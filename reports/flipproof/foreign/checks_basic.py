@@ -584,7 +584,6 @@ def check_definitions(traits: Traits) -> CheckGenerator:
                 observed=f"off by {error.max():.2g} of the largest speed",
                 where=time_of_max(hits.time, error),
                 advice=advice,
-                moved=advice == ANSWERED,
             )
     if answer.r is None or not given:
         raise NotApplicableError("no r is given" if answer.r is None else "neither r_cm nor inertia is given")
