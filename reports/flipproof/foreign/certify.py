@@ -180,6 +180,22 @@ def domain_text(domain: Mapping[str, tuple[float, float]]) -> str:
     return ", ".join(parts)
 
 
+ASKED: Final = "; asked: "
+"""What comes before the question in the line of one that was not answered."""
+
+
+def _bare(reason: str) -> str:
+    return reason.partition(ASKED)[0]
+
+
+def _question(ask: Ask) -> str:
+    """Return in words what tells a question from most others."""
+    throw, first, last = ask.scenario, ask.times[0], ask.times[-1]
+    times = f"t = {first:.3g} s" if len(ask.times) == 1 else f"{len(ask.times)} times, {first:.3g} to {last:.3g} s"
+    words = f"{times}, N = {throw.n_slices}, e = {throw.restitution:.3g}, g = {throw.gravity:.3g} m/s^2"
+    return f"{words}, ice" if throw.frozen else words
+
+
 class _Recorder(Runner):
     """A runner that asks every question once, and records the domain of the throws that were answered."""
 
@@ -187,6 +203,7 @@ class _Recorder(Runner):
         self.runner, self.traits = runner, runner.traits
         self.answers: dict[tuple[Any, ...], Answer] = {}
         self.domain: dict[str, tuple[float, float]] = {}
+        self.asked = ""
 
     def __call__(self, ask: Ask) -> Answer:
         key = ask.scenario, ask.times.tobytes(), ask.start.tobytes(), ask.effort
@@ -196,6 +213,7 @@ class _Recorder(Runner):
 
     def ask_again(self, ask: Ask) -> Answer:
         """Ask, even if the same was asked before, and return the answer."""
+        self.asked = f"{ASKED}{_question(ask)}"
         answer = self.runner(ask)
         for name, (_, value) in VARIED.items():
             values = np.append(value(ask), self.domain.get(name, ())) + 0.0  # a sticky throw's e is -0.0
@@ -232,7 +250,9 @@ def certify(
         result = _result(name, suite[name], traits, recorder)
         if result.verdict == FAILED and result.observation is None:
             earlier_checks = [
-                earlier.check for earlier in results if earlier.observation is None and earlier.reason == result.reason
+                earlier.check
+                for earlier in results
+                if earlier.observation is None and _bare(earlier.reason) == _bare(result.reason)
             ]
             result = replace(result, reason=f"as in {earlier_checks[0]}") if earlier_checks else result
         results.append(result)
@@ -257,7 +277,7 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     except NotApplicableError as why:
         return result(verdict=IDLE, reason=str(why), facts=why.facts)
     except ForeignError as error:
-        message = f"{error}; known: {reason}" if reason else str(error)
+        message = f"{error}{recorder.asked}" + (f"; known: {reason}" if reason else "")
         return result(verdict=FAILED if reason is None else EXPECTED, reason=message)
     result = partial(result, facts=observation.facts)
     if observation.holds and reason is not None:
