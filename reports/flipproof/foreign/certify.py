@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
@@ -15,7 +14,6 @@ import numpy as np
 from flipproof.foreign import checks_basic, checks_measured, elsewhere
 from flipproof.foreign.checking import Check, NotApplicableError, Observation, drive
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
-from flipproof.foreign.likeness.mistakes import naming
 from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
@@ -60,11 +58,6 @@ CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
 
 A new check is one generator and one line here.
 """
-
-OF_MOTION: Final = frozenset(
-    ("piecewise", "angular-momentum", "angle", "restitution", "equation", "gravity", "mirror", "elsewhere")
-)
-"""Checks that may fail because of a known mistake; if one gives the same answers, their advice names it."""
 
 ENOUGH: Final = "enough"
 """The last line of the whole suite: whether at least half of the checks could run."""
@@ -187,14 +180,30 @@ def domain_text(domain: Mapping[str, tuple[float, float]]) -> str:
     return ", ".join(parts)
 
 
+ASKED: Final = "; asked: "
+"""What comes before the question in the line of one that was not answered."""
+
+
+def _bare(reason: str) -> str:
+    return reason.partition(ASKED)[0]
+
+
+def _question(ask: Ask) -> str:
+    """Return in words what tells a question from most others."""
+    throw, first, last = ask.scenario, ask.times[0], ask.times[-1]
+    times = f"t = {first:.3g} s" if len(ask.times) == 1 else f"{len(ask.times)} times, {first:.3g} to {last:.3g} s"
+    words = f"{times}, N = {throw.n_slices}, e = {throw.restitution:.3g}, g = {throw.gravity:.3g} m/s^2"
+    return f"{words}, ice" if throw.frozen else words
+
+
 class _Recorder(Runner):
     """A runner that asks every question once, and records the domain of the throws that were answered."""
 
     def __init__(self, runner: Runner) -> None:
         self.runner, self.traits = runner, runner.traits
         self.answers: dict[tuple[Any, ...], Answer] = {}
-        self.named: tuple[str, bool] | None = None
         self.domain: dict[str, tuple[float, float]] = {}
+        self.asked = ""
 
     def __call__(self, ask: Ask) -> Answer:
         key = ask.scenario, ask.times.tobytes(), ask.start.tobytes(), ask.effort
@@ -204,6 +213,7 @@ class _Recorder(Runner):
 
     def ask_again(self, ask: Ask) -> Answer:
         """Ask, even if the same was asked before, and return the answer."""
+        self.asked = f"{ASKED}{_question(ask)}"
         answer = self.runner(ask)
         for name, (_, value) in VARIED.items():
             values = np.append(value(ask), self.domain.get(name, ())) + 0.0  # a sticky throw's e is -0.0
@@ -240,7 +250,9 @@ def certify(
         result = _result(name, suite[name], traits, recorder)
         if result.verdict == FAILED and result.observation is None:
             earlier_checks = [
-                earlier.check for earlier in results if earlier.observation is None and earlier.reason == result.reason
+                earlier.check
+                for earlier in results
+                if earlier.observation is None and _bare(earlier.reason) == _bare(result.reason)
             ]
             result = replace(result, reason=f"as in {earlier_checks[0]}") if earlier_checks else result
         results.append(result)
@@ -265,32 +277,18 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     except NotApplicableError as why:
         return result(verdict=IDLE, reason=str(why), facts=why.facts)
     except ForeignError as error:
-        message = f"{error}; known: {reason}" if reason else str(error)
+        message = f"{error}{recorder.asked}" + (f"; known: {reason}" if reason else "")
         return result(verdict=FAILED if reason is None else EXPECTED, reason=message)
     result = partial(result, facts=observation.facts)
     if observation.holds and reason is not None:
         return result(verdict=FAILED, observation=observation, reason=f"declared as a failure ({reason}), but holds")
     if observation.holds:
         return result(verdict=WEAK if observation.weak else PASSED, observation=observation)
-    if name in OF_MOTION or observation.moved:
-        named, explained = _named(traits, recorder)
-        # What explains some throws alone stands beside the advice, what explains all in its place.
-        beside = [] if explained else [observation.advice]
-        observation = replace(observation, advice="; ".join(filter(None, [named, *beside])))
     return result(
         verdict=FAILED if reason is None else EXPECTED,
         observation=observation,
         reason=f"known: {reason}" if reason else "",
     )
-
-
-def _named(traits: Traits, recorder: _Recorder) -> tuple[str, bool]:
-    """Return what ``naming`` says of a solver. It is sought once."""
-    if recorder.named is None:
-        recorder.named = "", False
-        with suppress(WaitingError):  # nobody is asked to write more answers for an advice
-            recorder.named = drive(naming(traits), recorder)
-    return recorder.named
 
 
 def _coverage(results: Iterable[Result]) -> Result:

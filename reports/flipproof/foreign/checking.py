@@ -43,7 +43,6 @@ class Observation:
 
     ``expected`` and ``observed`` are phrases with numbers, ``where`` names throw and time, ``advice`` says what to do
     if the check failed; ``weak`` says what the check could not see although it holds; ``facts`` go into the passport.
-    ``moved`` says that the motion itself may be the cause, even if the check is one of what is answered.
     """
 
     holds: bool
@@ -53,7 +52,6 @@ class Observation:
     advice: str = ""
     weak: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)
-    moved: bool = False
 
 
 Result = TypeVar("Result")

@@ -109,11 +109,13 @@ def check_start(traits: Traits) -> CheckGenerator:
         hint = WRAPPED
     initial = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
     few_digits = _digits_advice(worst, initial[worst][0], float(initial[worst][1][0])) if worst in initial else ""
-    if worst == "omega" and not (errors[worst] <= bound or cached or from_slope):
+    if worst in initial and abs(initial[worst][1][0] + initial[worst][0]) <= bound * max(1.0, abs(initial[worst][0])):
+        hint = f"{worst}(0) is {initial[worst][1][0]:.3g}, of the other sign: take {worst}_0 with its sign"
+    elif worst == "omega" and not (errors[worst] <= bound or cached or from_slope):
         (inside,) = yield [replace(ask, start=elsewhere.far_from_ends(throw))]
         if abs(inside.omega[0] / throw.omega0 - 1.0) <= bound:
             hint = "right from a start far from the ends: look at the places of the ends, h/2N and L - h/2N"
-        elif not hint and abs(answer.omega[0] / throw.omega0 + 1.0) > bound:  # the sign alone needs no other J
+        elif not hint:
             hint = "omega(0) is omega_0: in J_0 omega_0 / J, J_0 and J are to have one definition"
     return Observation(
         holds=errors[worst] <= bound,
@@ -375,6 +377,15 @@ def _turning_advice(theta: FloatArray, turned: FloatArray) -> str:
     growth = np.diff(errors)
     if abs(np.sum(np.sign(growth))) == len(growth) and np.max(np.abs(np.diff(growth))) < 0.2 * np.max(np.abs(growth)):
         return "theta advances unevenly: it is theta_0 + omega_0 t; see that no slice moves within a step of ice"
+    early, late = (float(np.mean(np.abs(half))) for half in np.array_split(errors, 2))
+    delays = -errors / THROW.omega0
+    extent = float(np.max(np.abs(delays)))
+    if np.ptp(np.sign(np.where(np.abs(delays) > 1e-6 * extent, delays, 0.0))) < 2 and late < 2.0 * early:
+        # It does not add up.
+        return (
+            f"theta is that of up to {extent:.2g} s {'earlier' if delays.max() == extent else 'later'}, of another "
+            "instant each time: answer that of the time asked, not that at an end of the step"
+        )
     return ""
 
 
@@ -515,15 +526,8 @@ DEFINED: Final = {
 """What is answered beside r, and what to look at."""
 
 
-ANSWERED: Final = (
-    "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered, and at "
-    "what an impact does"
-)
-"""What to look at where slices leave their ends at no factor of their speed."""
-
-
 def _rebound_advice(hits: Impacts) -> str:
-    """Return what is wrong with the speeds of impacts: all by one factor, the rebound; else how they are answered."""
+    """Return by which factor slices leave the ends, if it is one; else nothing."""
     e = THROW.restitution
     powers = {
         ", the root of e": e**0.5,
@@ -538,12 +542,38 @@ def _rebound_advice(hits: Impacts) -> str:
         if not len(factors):
             continue
         if np.ptp(factors) > 0.01 * factors.max():
-            return ANSWERED
+            return ""
         factor = float(np.median(factors))
         if abs(factor / e - 1.0) > 0.01:
             word = next((word for word, value in powers.items() if abs(factor / value - 1.0) < 0.01), "")
             wrong.append(f"slices leave the {name} at {factor:.3g} of their speed{word}")
-    return f"{' and '.join(wrong)}: look at the rebound, and at what is answered of it" if wrong else ANSWERED
+    return f"{' and '.join(wrong)}: look at the rebound, and at what is answered of it" if wrong else ""
+
+
+def _speeds_advice(traits: Traits, hits: Impacts) -> elsewhere.TextGenerator:
+    """Return whether the impacts are wrong or only the speeds answered of them: v is asked just before and after each.
+
+    The faster half of the slices counts: meanwhile they change their speed by some per cent at most.
+    """
+    room = 1e-4 * THROW.duration
+    ends = np.concatenate(([0.0], hits.time, [THROW.duration]))
+    lone = np.minimum(np.diff(ends)[:-1], np.diff(ends)[1:]) > 4 * room
+    struck = np.flatnonzero(lone & (hits.speed_after > 0.0))
+    times = (hits.time[struck, None] + (-room, room)).ravel()
+    factor = 0.0
+    if len(struck):
+        times.setflags(write=False)
+        (close,) = yield [replace(ask_of(traits, THROW, 2 if traits.refined_by else 0), times=times)]
+        if close.v is not None:
+            v = np.array([close.v[2 * k : 2 * k + 2, index] for k, index in enumerate(hits.slice[struck])])
+            fast = v[np.abs(v[:, 0]) >= np.median(np.abs(v[:, 0]))]
+            factor = float(np.median(-fast[:, 1] / np.where(fast[:, 0], fast[:, 0], np.inf)))
+    text = "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered"
+    if abs(factor / THROW.restitution - 1.0) < 0.1:
+        return f"{text}, for in v slices do rebound at e times their speed"
+    if factor > 0.0:
+        return f"in v, too, slices rebound at {factor:.2g} of it: look at what an impact does to slice and bottle"
+    return f"{text}, and at what an impact does"
 
 
 def _ends_exchanged(answer: Answer, hits: Impacts) -> bool:
@@ -567,6 +597,9 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     given = [name for name in DEFINED if name in answer.given]
     if (hits := answer.impacts) is not None and len(hits):
         error = np.abs(hits.speed_after - THROW.restitution * hits.speed_before) * (hits.speed_after > 0)
+        # Of several that strike at one instant, the recoil may send one off faster than its own rebound.
+        near = np.abs(np.diff(hits.time, prepend=-np.inf, append=np.inf)) < 1e-9 * THROW.duration
+        error[(near[1:] | near[:-1]) & (hits.speed_after > THROW.restitution * hits.speed_before)] = 0.0
         error /= max(float(np.max((hits.speed_before, hits.speed_after))), 1e-300)
         holds = bool(error.max() <= 0.02)  # they may be read off two steps
         if holds and _ends_exchanged(answer, hits):
@@ -577,14 +610,13 @@ def check_definitions(traits: Traits) -> CheckGenerator:
                 advice="look at the sign of the end in the answered impacts",
             )
         if not (holds and answer.r is not None and given):
-            advice = _rebound_advice(hits)
+            advice = _rebound_advice(hits) or (yield from _speeds_advice(traits, hits))
             return Observation(
                 holds=holds,
                 expected="speed_after = e speed_before of each of the impacts, or 0",
                 observed=f"off by {error.max():.2g} of the largest speed",
                 where=time_of_max(hits.time, error),
                 advice=advice,
-                moved=advice == ANSWERED,
             )
     if answer.r is None or not given:
         raise NotApplicableError("no r is given" if answer.r is None else "neither r_cm nor inertia is given")
@@ -600,10 +632,9 @@ def check_definitions(traits: Traits) -> CheckGenerator:
         hint += _parts_advice(answer.r, values) or _beyond_advice(answer, errors["inertia"] > bound)
     elif np.max(np.abs(values + derived["r_cm"] - THROW.bottle.length)) < bound * THROW.bottle.length:
         hint += "r_cm is L minus the right one: measure it from the cap; "
-    elif (
-        not hint and answer.t[0] == 0.0 and errors["r_cm"][0] <= bound and np.ptp(values) > bound * THROW.bottle.length
-    ):
-        hint = _drift_advice(answer, int(np.argmax(errors["r_cm"] > bound)))
+    moves = np.ptp(values) > bound * np.max(np.abs(values))
+    if wrong and not hint and answer.t[0] == 0.0 and errors[worst][0] <= bound and moves:
+        hint = yield from _drift_advice(traits, answer, worst, errors[worst] > bound)
     return Observation(
         holds=not wrong,
         expected=f"within {bound:.1g} of those that follow from r"
@@ -631,26 +662,44 @@ def _defined(answer: Answer) -> tuple[dict[str, FloatArray], dict[str, FloatArra
 def _beyond_advice(answer: Answer, wrong: NDArray[np.bool_]) -> str:
     """Return that an inertia is wrong only where a slice is answered on an end, if it is and is right elsewhere."""
     assert answer.r is not None
-    on_end = np.any((answer.r <= THROW.r_min) | (answer.r >= THROW.r_max), axis=1)
-    if not wrong.any() or np.mean(wrong) > 0.5 or np.any(wrong & ~on_end):
+    ends = {"the cap": np.any(answer.r <= THROW.r_min, axis=1), "the base": np.any(answer.r >= THROW.r_max, axis=1)}
+    if not wrong.any() or np.mean(wrong) > 0.5 or np.any(wrong & ~np.logical_or(*ends.values())):
         return ""
+    end = next((name for name, on_end in ends.items() if not np.any(wrong & ~on_end)), "an end")
     return (
-        "only while a slice is answered on an end: J may be that of a slice beyond it, whose r is clipped: look at "
-        "impacts that a step misses; "
+        f"only while a slice is answered on {end}: J may be that of a slice beyond it, whose r is clipped: look at "
+        "where slices turn there, at h/2N and L - h/2N, and at impacts that a step misses; "
     )
 
 
-def _drift_advice(answer: Answer, first: int) -> str:
-    """Return what may drive r_cm off the centre of mass from output ``first`` on: impacts, or smooth forces."""
+def _drift_advice(traits: Traits, answer: Answer, name: str, wrong: NDArray[np.bool_]) -> elsewhere.TextGenerator:
+    """Return what may drive r_cm or J off what follows from r: impacts, or a force that a throw without it lacks."""
     assert answer.r is not None
+    first = int(np.argmax(wrong))
     at_end = (answer.r < THROW.r_min + 1e-3 * THROW.slice_height) | (answer.r > THROW.r_max - 1e-3 * THROW.slice_height)
-    look_at = "the reaction of the drag, at inertial forces, and at the launch velocity"
-    if (at_end & ~at_end[0])[: first + 2].any():
-        look_at = "the recoil, and at what a slice that comes to rest does to the bottle"
+    struck = (at_end & ~at_end[0])[: first + 2].any()
+    if answer.impacts is not None:
+        struck |= np.any(answer.impacts.time < answer.t[first])
+    look_at = "inertial forces, and at the launch velocity"
+    if struck:
+        look_at = "what an impact does to the bottle, and at slices that come to rest or that the recoil lifts off"
+    else:
+        ask, inside = ask_of(traits, THROW), elsewhere.far_from_ends(THROW)
+        free, afloat = yield [replace(ask, scenario=replace(THROW, drag=0.0)), replace(ask, start=inside)]
+        if not _is_off(free, name, first):
+            look_at = "the reaction of the drag: without drag it is right"
+        elif not _is_off(afloat, name, first):
+            look_at = "the forces of slices at rest on the bottle: without a slice at rest it is right"
     return (
-        f"r_cm is right at release and not from t = {answer.t[first]:.2g} s on: if it follows from the motion, bottle "
-        f"and water are not moved by opposite forces: look at {look_at}"
+        f"{name} is right at release and not from t = {answer.t[first]:.2g} s on: if it follows from the motion, "
+        f"bottle and water are not moved by opposite forces: look at {look_at}"
     )
+
+
+def _is_off(answer: Answer, name: str, first: int) -> bool:
+    """Return whether r_cm or J is off what follows from r before slices may strike, or up to output ``first``."""
+    errors = _defined(answer)[1][name]
+    return bool(errors[: max(first, int(np.searchsorted(answer.t, SMOOTH.duration))) + 1].max() > 2e-5)
 
 
 def _slopes(answer: Answer) -> tuple[FloatArray, FloatArray]:
@@ -658,6 +707,17 @@ def _slopes(answer: Answer) -> tuple[FloatArray, FloatArray]:
     assert answer.r is not None
     assert answer.v is not None
     return np.diff(answer.r, axis=0) / np.diff(answer.t)[:, None], (answer.v[1:] + answer.v[:-1]) / 2
+
+
+def _frame_advice(answer: Answer) -> str:
+    """Return that v differs from dr/dt by the same for all slices, as if measured in another frame, if it does."""
+    slope, mean = _slopes(answer)
+    apart = mean - slope
+    if not rms(np.ptp(apart, axis=1)) < 0.05 * rms(apart):
+        return ""
+    drift = THROW.slice_mass * slope.sum(axis=1) / THROW.total_mass
+    frame = ", by the velocity of the common centre of mass" if rms(apart[:, 0] + drift) < 0.05 * rms(apart) else ""
+    return f"v and dr/dt differ by the same for every slice{frame}: "
 
 
 def _behind_advice(answer: Answer) -> str:
@@ -786,6 +846,7 @@ def check_velocity(traits: Traits) -> CheckGenerator:
             if traits.refined_by and sizes[0] < SLIGHT
             else ""
         )
+        + _frame_advice(answers[0])
         + "v is measured in the bottle, from cap to base, at the instant of r and of the same slice",
         facts={"velocity": sizes},
     )

@@ -220,7 +220,8 @@ def check_order_before(traits: Traits) -> CheckGenerator:
             "how a step begins without them, the instant at which omega, r_CM or J are taken, or how a step is cut to "
             "a time asked, costs the order"
         )
-    if not holds and 0.0 < changes[worst][0] < SLIGHT and not abs(orders[worst] - 1.0) < 0.15:  # order 1: no digits
+    low_order = orders[worst] < required  # not only where output times cut steps
+    if low_order and 0.0 < changes[worst][0] < SLIGHT and not abs(orders[worst] - 1.0) < 0.15:  # order 1: no digits
         advice = (
             f"already at the longest steps {worst} changes by no more than {changes[worst][0]:.0e}: look for a "
             f"constant of few digits, or for single precision; {advice or default_advice}"

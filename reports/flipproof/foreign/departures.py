@@ -110,6 +110,7 @@ LOOK_AT: Final[Mapping[str, str]] = {
     "rests": "what holds a slice at rest, and its part in the motion of the others",
     "begin of rests": "when a slice stays on its end instead of rebounding",
     "end of rests": "when a slice at rest is let go",
+    "slow rebounds": "the speed below which a slice rests instead of rebounding, at most |omega_0| L / 10 000",
     "impacts at one instant": "impacts of several slices at one instant",
     "order of impacts in a step": "several impacts close together: each at its own time, the earliest first",
     "weight": "the weight, g cos(theta): its size, sign, angle and instant",
@@ -129,6 +130,9 @@ LOW: Final = 0.03
 
 MANY: Final = 10
 """Impacts of a throw from which on a limit on their number is thought of."""
+
+SLOW: Final = 0.03
+"""Speed of a rebound that a slice may lose by coming to rest too early [L omega_0]."""
 
 FEW: Final = 3
 """Fewest departing intervals that are reported: rounding may move one impact to the other side of an output."""
@@ -368,7 +372,7 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
     category, look_at, members = "", "", np.ones(len(intervals), dtype=bool)
     for min_share in (1.0, SURE):
         best = 2 * total / (len(intervals) + total)  # as good as all intervals
-        for name, (holds, key) in _categories_of(intervals).items():
+        for name, (holds, key) in (_categories_of(intervals) | _slow_rebounds(intervals, departs)).items():
             inside = np.array([holds(interval) for interval in intervals])
             common = int(np.sum(inside & departs))
             score = 2 * common / (int(inside.sum()) + total) - (0.0 if key else UNTOLD)
@@ -382,8 +386,8 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
     departed = [interval for interval, chosen in zip(intervals, members & departs, strict=True) if chosen]
     seldom = 3 * common < count  # a wrong term would show wherever it acts
     cause = cause_of(departed, recoil=switches_of(equation).recoil, seldom=seldom and look_at == "drag")
-    if look_at == "impacts on rests" and "recoil" in cause:
-        cause = ""  # other impacts recoil rightly
+    if look_at == "slow rebounds" or (look_at == "impacts on rests" and "recoil" in cause):
+        cause = ""  # other impacts rebound and recoil rightly
     if "look at" in cause or (cause and look_at in (*OF_FORCES, "odd")):  # the terms are named
         look_at = ""
     if look_at in OF_FORCES and (
@@ -395,13 +399,23 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
     return where, "; ".join(part for part in (cause, advice) if part)
 
 
-def _categories_of(intervals: Sequence[Interval]) -> Mapping[str, Category]:
+def _categories_of(intervals: Sequence[Interval]) -> dict[str, Category]:
     """Return the categories, with one for each restitution if there are several."""
     restitutions = sorted({interval.throw.restitution for interval in intervals})
     return {
         **CATEGORIES,
         **{f"with an impact at e = {e:.3g}": _impact_at(e) for e in restitutions if len(restitutions) > 1},
     }
+
+
+def _slow_rebounds(intervals: Sequence[Interval], departs: BoolArray) -> dict[str, Category]:
+    """Return the category of intervals with rebounds as slow as in those that depart, if it leaves out faster ones."""
+    slowest = [i.slowest_rebound for i, chosen in zip(intervals, departs, strict=True) if chosen]
+    limit = max(slowest, default=np.inf)
+    if not limit < SLOW:
+        return {}
+    name = f"with a rebound slower than {limit:.1g} omega_0 L"
+    return {name: (lambda i: i.slowest_rebound <= limit, "slow rebounds")}
 
 
 def _impact_at(restitution: float) -> Category:

@@ -868,5 +868,7 @@ def _field_advice(comparison: Comparison, prefix: str = "", *, ice: bool = False
     ):
         return ""
     fields = ", ".join(comparison.wrong)
+    if set(comparison.wrong) == {"impacts"}:
+        return f"{prefix}the motion is right, the impacts listed are not: look at time, slice, end and number of each"
     closer = ", and at sign, unit and instant of v" if fields == "v" else ""
     return f"{prefix}omega is right, {fields} not: look at how the answer is put together{closer}"
