@@ -1,6 +1,8 @@
-"""What is refused: wrong values of the packages; in which words, ``refusals.txt`` says."""
+"""What is refused: wrong values of the packages and of the command line; in which words, ``refusals.txt`` says."""
 
+import contextlib
 import functools
+import io
 import os
 import re
 from collections.abc import Callable
@@ -10,6 +12,7 @@ from math import inf, nan
 from pathlib import Path
 
 import pytest
+import sweep_kill
 from landing_forms import at_rest
 
 import engine_check
@@ -18,6 +21,8 @@ import slicemodel
 from engine_check import DEFAULT_DT, PymunkKnobs
 from flipproof.chapters.landing.single import land_throw
 from flipproof.chapters.landing.throws import Scatter, aimed
+from flipproof.cli import main as cli
+from flipproof.frame import solvers
 from ode_reference import Switches
 from slicemodel import Bottle, Impacts, Outcome, Scenario, ScenarioError, Table, Touch, Trajectory
 from slicemodel.scenario import shown
@@ -351,9 +356,165 @@ def test_a_wrong_value_is_refused_by_name_value_and_what_would_do(name):
     assert "\n" not in refusal(name)
 
 
-def test_the_words_are_those_of_the_file():
+# ---------------------------------------------------------------------- the command line
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples" / "tracker"
+TRACKS = "track tab.txt --cap cap --base base --length-unit m"
+DESIGN = sweep_kill.DESIGN.format(samples=2)
+FILES = {
+    "folder/mine.txt": "mine",
+    "mine.py": "def solve(ask): ...\n",
+    "sweep.toml": DESIGN,
+    "wrong.toml": DESIGN.replace("rtol = 1e-6", "rtol = 6.0"),
+    "throw.toml": "[scenario]\n",
+    "full.toml": "[scenario]\nwater_mass = 1.4\n",
+    "frozen.toml": "[scenario]\nfrozen = true\n",
+    "gravity.toml": "[scenario]\ngravity = 0.0\n",
+    "drag.toml": "[scenario]\nn_slices = 5\ndrag = 1e15\n",
+    "duration.toml": "[scenario]\nduration = 1e15\n",
+    "omega.csv": "t,omega\n0,1\n1,1\n",
+    "theta.csv": "t,theta\n0,1\n1,1\n",
+    "late.csv": "t,omega\n2,1\n3,1\n",
+    "later.csv": "t,omega\n0.5,1\n3,1\n",
+    "still.csv": "t,omega\n0,0\n1,1\n",
+    "long.csv": "t,omega\n0,1\n3,1\n",
+    "flat.csv": "t,theta,omega\n0,1,1\n",
+    "x.csv": "t,x\n0,1\n1,2\n",
+    "r_cm.csv": "t,r_cm\n0,1\n1,2\n",
+    "repeated.csv": "t,theta\n" + "0,1\n" * 20,
+    "short.csv": "t,theta\n0,1\n1,2\n",
+}
+COMMANDS = {
+    "": ["repot", "qqq", "help repot", "--versoin"],
+    "bounce pymunk --plot": ["a.pdf"],
+    "certify": ["nowhere.py:solve", "math:no_such", "csv:folder", "mine.py:nope", "csv:throw.toml/answers"],
+    "certify eq8 --equation": ["eq9"],
+    "certify eq8 --json": ["no/such/p.json"],
+    "certify eq8 --seed": ["-1", "nan"],
+    "check throw.toml --only": ["thresholds", "luck", ","],
+    "check throw.toml --junit": ["none/junit.xml"],
+    "check throw.toml --only ice --junit": ["folder"],
+    "check throw.toml --only ice --tolerance": ["0.1", "-1", "nan"],
+    "check throw.toml --only ice --no-cache --with": ["csv:flat.csv", "mine.py:solve --with mine.py:solve"],
+    "compare eq8": ["missing.csv", "zzz"],
+    "compare eq8 eq8 --scenario": ["full.toml"],
+    "compare eq8 eq8 --junit": ["x.xml"],
+    "compare eq8 eq8 --tolerance 1 --junit": ["nowhere/x.xml"],
+    "compare omega.csv": ["theta.csv", "late.csv", "later.csv"],
+    "compare still.csv": ["long.csv"],
+    "explain eq8": ["csv:omega.csv"],
+    "export --solver exact-step --slices 5 --frame-rate": ["0", "1e6", "nan"],
+    "export --solver exact-step --slices 5 --out": ["none/where.txt", "folder"],
+    "export --solver exact-step --start": ["soon", "nan"],
+    "export --solver exact-step --origin": ["1;2", "1,x"],
+    "export --solver exact-step": ["duration.toml"],
+    "fit a.csv --noise": ["1e7"],
+    "fit a.csv --minutes": ["-1"],
+    "land": ["gravity.toml"],
+    "land --height 0.2": ["gravity.toml"],
+    "land --restitution": ["1.2", "-0.1"],
+    "land --friction": ["-1", "1e16", "nan", "rough"],
+    "land --height": ["1e16", "9", "-90"],
+    "land --law": ["after"],
+    "land --programs": ["box2d"],
+    "land --slices": ["0"],
+    "map --out": ["out"],
+    "map --axis": ["gamma"],
+    "map --axis gamma --out out --size": ["20", "1x20"],
+    "map --axis gamma --out out --export": ["rows.xls"],
+    "map --axis gamma --out out": ["nowhere.toml"],
+    "paper --out out --figure": ["4", "10a", "", "fig7b", "7"],
+    "paper --figure 2b --out": ["folder"],
+    "place": ["eq9", "mine.py:nope"],
+    "report": ["nowhere.toml", "full.toml", "--quik"],
+    "report --out": ["full.toml", "folder"],
+    "report --out out --measured": ["x.csv", "r_cm.csv", "repeated.csv", "short.csv"],
+    "report --out out --with": ["nowhere.py:solve", "mine.py", "mine.py:solve --with mine.py:solve", "eq8"],
+    "report --slices": ["0", "few"],
+    "simulate": ["throw.toml frozen.toml", "--solver"],
+    "simulate --out": ["nowhere/a.csv"],
+    "simulate drag.toml --slices": ["3"],
+    "simulate --solver": ["eq9", "nowhere.py:solve"],
+    "simulate --solver eq8 --steps": ["5"],
+    "simulate --solver mine.py:solve --steps": ["5"],
+    "simulate --steps": ["1", "0", "-3", "9999999999", "2.5"],
+    "sweep": ["sweep.toml"],
+    "sweep sweep.toml --out": ["sweep.toml"],
+    "sweep sweep.toml --out out --export": ["rows.xls"],
+    "sweep --out out": ["nowhere.toml", "wrong.toml"],
+    "sweep sweep.toml --out out --executor": ["nonsense"],
+    "sweep sweep.toml --out begun --executor": ["nowhere_at_all:F", "os:getcwd"],
+    "sweep sweep.toml --out out --jobs 1 --executor": ["a:b"],
+    "track": ["tab.txt", "tab.txt single_cap.txt"],
+    "track tab.txt --cap": ["cap"],
+    "track --cap cap --base base": ["tab.txt"],
+    "track tab.txt --cap cap --base base --length-unit": ["inch"],
+    "track tab.txt --base base --length-unit m --cap": ["cop"],
+    "track --cap cap --base base --length-unit m tab.txt": ["tab.txt"],
+    TRACKS + " --frame-rate": ["0"],
+    TRACKS + " --release": ["9"],
+    TRACKS + " --landing": ["-1"],
+    TRACKS + " --release 0.5 --landing": ["0.4"],
+    TRACKS + " --out": [".", "folder"],
+    "upright --out out": ["gravity.toml", "frozen.toml"],
+    "upright --out out --throws": ["0"],
+    "upright --out out --fillings": ["0.2,1.2", "1e7", "0.2,x", "0.3,0.2", "0.2,0.2"],
+    "upright --out out --families": ["C"],
+    "upright --out out --scatter": ["1e7,0,0", "1,2", "0,0,0", "1e-18,0,0"],
+    "upright --out out --restitution": ["2"],
+    "upright --out out --map": ["1x5"],
+    "upright --out out --executor": ["nonsense"],
+    "waterfall --out out --slices": ["0"],
+}
+LINES = {
+    f"flipproof {start} {wrong}": (*start.split(), *wrong.split(" "))
+    for start, ends in COMMANDS.items()
+    for wrong in ends
+}
+
+
+def files():
+    """Return what lies in the folder; a sweep whose executor is none may have begun its own."""
+    return {path: path.stat().st_mtime_ns for path in Path().rglob("*") if path.parts[0] != "begun"}
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory):
+    """For every line: its status, what it printed, what it said of errors, and whether it wrote no file."""
+    told = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("place"))
+        solve = solvers.solve  # "export" asks for a flight after its refusals: here it would be given none
+        patch.setattr(solvers, "solve", lambda *ask, **how: None if words[0] == "export" else solve(*ask, **how))
+        for name in ("tab.txt", "single_cap.txt"):
+            Path(name).write_bytes((EXAMPLES / name).read_bytes())
+        for name, text in FILES.items():
+            Path(name).parent.mkdir(exist_ok=True)
+            Path(name).write_text(text)
+        for line, words in LINES.items():
+            before, printed, said = files(), io.StringIO(), io.StringIO()
+            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(said):
+                try:
+                    status = cli.main(list(words))
+                except SystemExit as end:
+                    status = end.code
+            told[line] = (status, printed.getvalue(), said.getvalue(), files() == before)
+    return told
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_every_mistake_is_one_line_that_names_it_and_status_2(line, answers):
+    """The line names its last option or what was given there, or an option that is missing; nothing is written."""
+    status, printed, said, spared = answers[line]
+    assert (status, printed, said.count("\n"), spared) == (2, "", 1, True)
+    words = "|".join(re.findall(r"\w[\w-]*\w|\w", " ".join(LINES[line][-2:]))).replace("-", "[-_]")
+    assert re.match(rf"flipproof: error: (.*\W)?(--\w|{words})", said)
+
+
+def test_the_words_are_those_of_the_file(answers):
     """Rewrite the file, when they are to change, by ``REFUSALS=rewrite python -m pytest tests/test_refusals.py``."""
-    text = "".join(f"{name} | {FLOWN.sub('#', refusal(name))}\n" for name in ROWS)
+    said = {name: refusal(name) for name in ROWS} | {line: answer[2].strip() for line, answer in answers.items()}
+    text = "".join(f"{name} | {FLOWN.sub('#', words)}\n" for name, words in said.items())
     if os.environ.get("REFUSALS") == "rewrite":
         WORDS.write_text(text, encoding="utf-8")
     told = "words have changed; if they should, run REFUSALS=rewrite python -m pytest tests/test_refusals.py"
