@@ -141,10 +141,3 @@ def test_it_turns_backwards_alike_and_knows_no_restitution(model):
     back = ode_reference.solve(throw(0.5, theta0=-0.4, omega0=-20.0, drag=0.01, restitution=0.9), model)
     np.testing.assert_allclose(back.theta, -forth.theta, rtol=1e-13)
     np.testing.assert_allclose(back.r, forth.r, rtol=1e-13)
-
-
-@pytest.mark.parametrize("model", ["column", "rods"])
-@pytest.mark.parametrize(("name", "value"), [("rtol", math.nan), ("rtol", 1.0), ("atol", 0.0), ("times", [3.0])])
-def test_bad_input_is_refused_by_name(model, name, value):
-    with pytest.raises(ValueError, match=name):
-        ode_reference.solve(throw(0.5), model, **{name: value})

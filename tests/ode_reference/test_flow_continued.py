@@ -38,23 +38,3 @@ def test_a_slice_that_leaves_an_end_at_release_is_no_impact():
     striking = ode_reference.solve(state, "eq8", [1e-3], speeds=[1.0, -1.0, 0, 0, 0, 0])
     assert striking.impacts.slice.tolist() == [0, 1]
     assert striking.impacts.time.tolist() == [0.0, 0.0]
-
-
-@pytest.mark.parametrize(
-    ("speeds", "said"),
-    [
-        ([0.0] * 5, "are not 6 finite numbers"),
-        ([0.0] * 5 + [np.nan], "are not 6 finite numbers"),
-        (["a"] * 6, "are no numbers"),
-    ],
-)
-def test_speeds_that_are_none_are_refused(speeds, said):
-    with pytest.raises(ValueError, match=said):
-        ode_reference.solve(THROW, "eq8", speeds=speeds)
-
-
-def test_speeds_of_ice_and_of_other_methods_are_refused():
-    with pytest.raises(ValueError, match="frozen water"):
-        ode_reference.solve(replace(THROW, frozen=True), "eq8", speeds=[1.0] * 6)
-    with pytest.raises(ValueError, match="choose 'taylor'"):
-        ode_reference.solve(THROW, "eq8", method="Radau", speeds=[0.0] * 6)

@@ -16,7 +16,7 @@ from touches import touch
 import engine_check
 import ode_reference
 from ode_reference.landing.land import world_of
-from slicemodel import Bottle, Scenario, ScenarioError, Table
+from slicemodel import Bottle, Scenario, Table
 from slicemodel.observables import static_toppling_angle
 
 G = 9.81
@@ -316,42 +316,7 @@ def test_a_mirrored_throw_lands_alike():
     assert one.certified == pytest.approx(other.certified, abs=1e-3)
 
 
-# ---------------------------------------------------------------------- bad input
-
-
-CLOSE = WATER.initial_positions() - 0.05 * (np.arange(10) > 4) + 0.005 * (np.arange(10) == 6)
-
-
-@PROGRAMS
-@pytest.mark.parametrize(
-    ("start", "arguments", "words"),
-    [
-        (at_rest(WATER), {"law": "after"}, "law = 'after' is unknown"),
-        (at_rest(WATER), {"dt": 0.1}, r"dt = 0.1 s is outside .*0.001"),
-        (at_rest(WATER), {"dt": math.nan}, "dt = nan"),
-        (at_rest(ICE), {"law": "together"}, "law = 'together' has no meaning for ice"),
-        (at_rest(WATER, r=np.full(10, WATER.r_max)), {}, r"touch\.r\[1\] = 0\.273 m is outside \[0\.119, 0\.259\] m"),
-        (at_rest(WATER, r=CLOSE), {}, r"touch\.r\[5\] - touch\.r\[6\]"),
-    ],
-)
-def test_bad_arguments_are_refused_by_name_and_range(land, start, arguments, words):
-    with pytest.raises(ValueError, match=words):
-        land(start, Table(height=0.0), **arguments)
-
-
-@PROGRAMS
-def test_what_is_no_touch_or_table_or_law_is_refused_by_name(land):
-    with pytest.raises(ValueError, match=r"touch = None is not a slicemodel\.Touch"):
-        land(None, None)
-    with pytest.raises(ValueError, match=r"table = None is not a slicemodel\.Table"):
-        land(at_rest(WATER), None)
-    with pytest.raises(ValueError, match=r"law = \['together'\] is unknown"):
-        land(at_rest(WATER), Table(height=0.0), law=["together"])
-
-
-def test_a_step_of_an_engine_that_would_take_for_ever_is_refused():
-    with pytest.raises(ValueError, match=r"dt = 1e-12 s is outside \(5e-09, 0\.001\] s"):
-        engine_check.land(at_rest(WATER), Table(height=0.0), dt=1e-12)
+# ---------------------------------------------------------------------- strong drag
 
 
 @PROGRAMS
@@ -366,13 +331,3 @@ def test_drag_shortens_the_step_and_is_refused_where_no_step_follows_it(land):
     assert coarse.outcome == "lying"
     with pytest.raises(ValueError, match=r"drag = 400 kg/s is outside \[0, 265\]"):
         land(at_rest(replace(WATER, drag=400.0)), table)
-
-
-def test_an_unknown_engine_is_refused():
-    with pytest.raises(ValueError, match="engine = 'bullet' is unknown"):
-        engine_check.land(at_rest(WATER), Table(height=0.0), "bullet")
-
-
-def test_nothing_lands_without_gravity():
-    with pytest.raises(ScenarioError, match=r"touch\.scenario\.gravity"):
-        at_rest(replace(WATER, gravity=0.0))

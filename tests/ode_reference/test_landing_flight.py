@@ -124,15 +124,6 @@ def test_a_table_beside_the_thrower_is_reached_from_above_or_refused():
         ode_reference.fly(replace(ice, launch_velocity=(0.5, -1.0)), Table(height=0.07))
 
 
-def test_what_is_no_throw_or_table_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"scenario = None is not a slicemodel\.Scenario"):
-        ode_reference.fly(None, None)
-    with pytest.raises(ValueError, match=r"table = None is not a slicemodel\.Table"):
-        ode_reference.fly(WATER, None)
-    with pytest.raises(ValueError, match=r"scenario = None is not a slicemodel\.Scenario"):
-        ode_reference.turn(None, 0.1)
-
-
 def test_drag_that_no_step_follows_is_refused_unless_nothing_moves():
     strong = replace(WATER, drag=400.0)
     words = r"drag = 400 kg/s is outside \[0, 327\]"
@@ -141,9 +132,3 @@ def test_drag_that_no_step_follows_is_refused_unless_nothing_moves():
     with pytest.raises(ValueError, match=words):
         ode_reference.turn(strong, 0.1)
     assert ode_reference.fly(replace(strong, frozen=True), TABLE).omega == pytest.approx(WATER.omega0, rel=1e-12, abs=0)
-
-
-@pytest.mark.parametrize("every", [0.0, -1.0, math.nan, 3.0])
-def test_a_spacing_out_of_range_is_refused(every):
-    with pytest.raises(ValueError, match="every = "):
-        ode_reference.turn(replace(WATER, duration=0.1), every)

@@ -209,5 +209,3 @@ def test_own_inertia_is_that_of_discs_in_every_model(model):
         known = observables.moment_of_inertia(scenario, runs[1].r) + discs
         np.testing.assert_allclose(runs[1].inertia, known, rtol=1e-11)
     assert np.abs(runs[1].omega - runs[0].omega).max() > 0.1
-    with pytest.raises(ValueError, match="own_inertia"):
-        ode_reference.solve(scenario, model, own_inertia="yes")

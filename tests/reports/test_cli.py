@@ -85,48 +85,6 @@ def test_models_lists_everything_with_reasons(capsys):
         assert re.search(rf"^  {name}$", out, re.MULTILINE)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["report", "nowhere.toml"], ["nowhere.toml", "cannot be read"]),
-        (["report", "{bad}"], ["[scenario] water_mass = 1.4 kg", "capacity 1.0 kg"]),
-        (["report", "--out", "{bad}"], ["is a file"]),
-        (["report", "--out", "{full}"], ["holds mine.txt and not flipproof's own marker"]),
-        (["simulate", "--solver", "eq9"], ["solver 'eq9' is unknown", "did you mean 'eq8'?"]),
-        (["simulate", "--solver", "eq8", "--steps", "5"], ["eq8 is not a scheme"]),
-        *(
-            (["simulate", "--steps", n], [f"steps = {n} is not", "[2, 1000000000]"])
-            for n in ("1", "0", "-3", "9999999999")
-        ),
-        (["simulate", "--steps", "2.5"], ["'2.5' is not a whole number"]),
-        *((["certify", "eq8", "--seed", n], [f"'{n}' is not a whole number in [0, 2^63)"]) for n in ("-1", "nan")),
-        (["fit", "a.csv", "--noise", "1e7"], ["'1e7' is not a number in (0, 1e6)"]),
-        (["fit", "a.csv", "--minutes", "-1"], ["'-1' is not a number in (0, 1e6)"]),
-        (["simulate", "--out", "nowhere/a.csv"], ["the folder nowhere does not exist"]),
-        (["bounce", "pymunk", "--plot", "a.pdf"], ["'a.pdf' is not a file that ends in .png or .svg"]),
-        (["compare", "eq8", "missing.csv"], ["missing.csv is no file"]),
-        (["compare", "eq8", "zzz"], ["solver 'zzz' is unknown", "known: "]),
-        (["compare", "--scenario", "{bad}", "eq8", "eq8"], ["water_mass"]),
-        (["report", "--slices", "0"], ["'0' is not a whole number of at least 1"]),
-        (["report", "--slices", "few"], ["'few' is not a whole number"]),
-        (["repot"], ["command 'repot' is unknown", "did you mean 'report'?"]),
-        (["help", "repot"], ["did you mean 'report'?"]),
-        (["qqq"], ["command 'qqq' is unknown", "known: report"]),
-        (["report", "--quik"], ["flipproof report: option '--quik' is unknown", "did you mean '--quick'?"]),
-        (["--versoin"], ["option '--versoin' is unknown", "did you mean '--version'?"]),
-        (["simulate", "--solver"], ["flipproof: error: "]),
-        (["simulate", "a.toml", "b.toml"], ["flipproof simulate takes no further argument: b.toml"]),
-    ],
-)
-def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, words):
-    bad = tmp_path / "bad.toml"
-    bad.write_text("[scenario]\nwater_mass = 1.4\n")
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "mine.txt").write_text("mine")
-    places = {"bad": str(bad), "full": str(tmp_path / "full")}
-    refused(capsys, words, *(argument.format(**places) for argument in arguments))
-
-
 def test_no_command_writes_over_what_it_reads(capsys, tmp_path):
     throw, curve, mine = tmp_path / "throw.toml", tmp_path / "curve.csv", tmp_path / "mine.py"
     throw.write_text("[scenario]\nn_slices = 3\n")

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
-from made_up import command, refused
+from made_up import command
 
 from flipproof.check.comparison import compare_flights
 from flipproof.output.tables import Curve, read_curve
@@ -129,30 +129,10 @@ def test_without_omega_the_tolerance_is_of_theta():
     assert compare_flights(*flights, 0.6).findings[0].verdict == "pass"
 
 
-@pytest.mark.parametrize(
-    ("first", "second", "words"),
-    [
-        ("t,omega\n0,1\n1,1\n", "t,theta\n0,1\n1,1\n", "nothing can be compared: "),
-        ("t,omega\n0,1\n1,1\n", "t,omega\n2,1\n3,1\n", "has 0 times within those of"),
-        ("t,omega\n0,1\n1,1\n", "t,omega\n0.5,1\n3,1\n", "has 1 times within those of"),
-        ("t,omega\n0,0\n1,1\n", "t,omega\n0,1\n3,1\n", "omega is 0 at the first time"),
-    ],
-)
-def test_what_cannot_be_compared_is_said_in_one_line(capsys, tmp_path, first, second, words):
-    a, b = written(tmp_path / "a.csv", first), written(tmp_path / "b.csv", second)
-    refused(capsys, words, "compare", a, b)
-
-
 def test_without_a_tolerance_nothing_is_claimed(capsys, tmp_path):
     file = tmp_path / "differences.json"
     command(capsys, "compare", "eq8", "published-limit", "--slices", "3", "--json", file)
     assert {finding["kind"] for finding in json.loads(file.read_text())["findings"]} == {"observation"}
-
-
-def test_a_junit_file_that_could_say_nothing_is_refused(capsys):
-    junit = ("compare", "eq8", "eq8", "--junit")
-    refused(capsys, "--junit x.xml needs --tolerance", *junit, "x.xml")
-    refused(capsys, "the folder nowhere does not exist", *junit, "nowhere/x.xml", "--tolerance", "1")
 
 
 def test_a_flight_that_stops_is_said_and_passes_nothing(capsys):

@@ -232,20 +232,6 @@ def test_a_dead_worker_costs_its_guest(monkeypatch):
     assert "guest naive RK4: the worker process died" in lost.note
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--with", "nowhere.py:solve"], "there is no file nowhere.py"),
-        (["--with", "rk4.py"], "name the object in the file, too: rk4.py:solve"),
-        (["--with", RK4] * 2, "is there twice"),
-        (["--with", "eq8"], "--with eq8 names flipproof's own solver; flipproof certify eq8 tests it"),
-    ],
-)
-def test_a_spec_that_names_nothing_is_refused_before_the_work(capsys, tmp_path, arguments, said):
-    assert cli.main(["report", "--out", str(tmp_path / "r"), *arguments]) == 2
-    assert said in capsys.readouterr().err
-
-
 def checked(tmp_path, *arguments):
     (tmp_path / "throw.toml").write_text(THROW.to_toml())
     command = ["check", tmp_path / "throw.toml", "--only", "ice", "--no-cache", *arguments]
@@ -282,16 +268,6 @@ def test_check_holds_a_guest_to_what_the_baseline_found_of_it(tmp_path, capsys):
     file.write_text(file.read_text().replace("restitution = 1.0", "restitution = 0.9"))
     assert checked(tmp_path, *given) == 1
     assert any(one.startswith("FAIL  guest-naive-rk4-eq8: ") for one in capsys.readouterr().out.splitlines())
-
-
-def test_check_refuses_a_guest_that_is_a_curve_or_named_twice(tmp_path, capsys):
-    (tmp_path / "mine.csv").write_text("t,theta,omega\n0,1,1\n")
-    for arguments, words in (
-        (("--with", f"csv:{tmp_path / 'mine.csv'}"), "a curve cannot be asked"),
-        (("--with", RK4, "--with", RK4), "is there twice"),
-    ):
-        assert checked(tmp_path, *arguments) == 2
-        assert words in capsys.readouterr().err
 
 
 def test_the_provenance_says_which_code_a_guest_is(reported):

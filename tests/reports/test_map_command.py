@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_up import command as run
-from made_up import refused, study_map
+from made_up import study_map
 
 from flipproof.chapters.maps.chapter import exhibit
 from flipproof.chapters.maps.study import CURVE, RUNGS
@@ -239,23 +239,6 @@ def test_the_waterfall_command_draws_every_observable(capsys, tmp_path, monkeypa
     assert f"; {runs} were there" in out
     for observable in OBSERVABLES:
         assert (tmp_path / "out" / f"waterfall-{observable.name}.png").read_bytes() == b"anew"
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["map", "--out", "{out}"], "the following arguments are required: --axis"),
-        (["map", "--axis", "gamma"], "the following arguments are required: --out"),
-        (["map", "--axis", "gamma", "--size", "20", "--out", "{out}"], "'20' is not COLUMNSxROWS"),
-        (["map", "--axis", "gamma", "--size", "1x20", "--out", "{out}"], "each in [2, 1000]"),
-        (["map", "nowhere.toml", "--axis", "gamma", "--out", "{out}"], "nowhere.toml: cannot be read"),
-        (["map", "--axis", "gamma", "--out", "{out}", "--export", "rows.xls"], "is neither .csv nor .nc"),
-        (["waterfall", "--slices", "0", "--out", "{out}"], "'0' is not a whole number of at least 1"),
-    ],
-)
-def test_every_mistake_is_one_line_and_status_2(capsys, tmp_path, arguments, words):
-    refused(capsys, words, *(argument.format(out=tmp_path / "out") for argument in arguments))
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.usefixtures("here")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from made_up import refused
 
 import ode_reference
 from flipproof.build import ask_of, build, gather_report
@@ -74,18 +73,3 @@ def test_a_simulation_is_a_measurement(tmp_path):
     path = tmp_path / "simulated.csv"
     path.write_text(trajectory_csv(ode_reference.solve(THROW, model="eq8")), encoding="utf-8")
     assert read_table(path).quantity == "theta"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("t,x\n0,1\n1,2\n", "has no column"),
-        ("t,r_cm\n0,1\n1,2\n", "has no column theta or omega"),
-        ("t,theta\n" + "0,1\n" * 20, "t does not increase"),
-        ("t,theta\n0,1\n1,2\n", "12 are needed"),
-    ],
-)
-def test_what_cannot_be_held_is_refused_in_one_line(tmp_path, capsys, text, words):
-    path = tmp_path / "flight.csv"
-    path.write_text(text, encoding="utf-8")
-    refused(capsys, words, "report", "--measured", path, "--out", tmp_path / "out")

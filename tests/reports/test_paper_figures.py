@@ -12,7 +12,6 @@ import pytest
 from made_up import action, is_number
 
 from flipproof.frame.pool import SerialExecutor
-from flipproof.output.folder import OutputError
 from flipproof.paper import figures as paper_figures
 from flipproof.paper.cases import HALF_FULL, family
 from flipproof.paper.figures import ORDER, check_figures, exhibits_paper, keys_of
@@ -167,20 +166,6 @@ def test_columns_share_an_abscissa_only_if_it_is_the_same():
 def test_names_are_sorted_and_lenient_about_case():
     assert check_figures(["s1A", "7b", "7B"]) == ("7b", "S1a")
     assert keys_of(["2b"]) == {case.key for case in family("beta at 5 /s")}
-
-
-@pytest.mark.parametrize("name", ["4", "10a", "", "fig7b", "7"])
-def test_an_unknown_figure_is_answered_in_one_line_with_the_list(name, tmp_path):
-    with pytest.raises(ValueError, match=r"unknown; known: 2b, 3b, 5a, .*, S1a") as caught:
-        action("paper", "--figure", name, "--out", tmp_path / "out")
-    assert "\n" not in str(caught.value)
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_folder_with_other_files_is_refused_before_anything_flies(tmp_path):
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(OutputError, match="and not flipproof"):
-        action("paper", "--figure", "2b", "--out", tmp_path)
 
 
 def test_the_command_writes_figures_numbers_and_a_page(tmp_path, capsys, read_page):

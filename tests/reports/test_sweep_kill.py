@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import sweep_kill
-from made_up import command, refused
+from made_up import command
 
 from flipproof.sweep.design import read_design
 
@@ -132,29 +132,6 @@ def test_a_complete_sweep_is_not_made_again_and_is_exported(undisturbed, capsys)
     assert line.endswith(f"; {POINTS} were there")
     assert re.match(r"the first without a flight: water_mass = 1\.0\d* kg exceeds the bottle's capacity 1\.0 kg", why)
     assert len((out / "rows.csv").read_text().splitlines()) == POINTS + 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["{design}", "--out", "{design}"], "is a file that this command reads; name another"),
-        (["{design}", "--out", "{out}", "--export", "rows.xls"], "the ending '.xls' is neither .csv nor .nc"),
-        (["nowhere.toml", "--out", "{out}"], "nowhere.toml: cannot be read"),
-        (["{wrong}", "--out", "{new}"], "[[solvers]] 2 (eq8): rtol = 6.0 is outside [1e-13, 0.01]"),
-        (["{design}", "--out", "{new}", "--jobs", "1", "--executor", "a:b"], "not allowed with argument"),
-        (["{design}", "--out", "{new}", "--executor", "nonsense"], "is not MODULE:FACTORY"),
-        (["{design}", "--out", "{out}", "--executor", "nowhere_at_all:F"], "--executor nowhere_at_all:F: No module"),
-        (["{design}", "--out", "{out}", "--executor", "os:getcwd"], "str is no concurrent.futures.Executor"),
-        (["{design}"], "the following arguments are required: --out"),
-    ],
-)
-def test_every_mistake_is_one_line_and_status_2(undisturbed, capsys, tmp_path, arguments, words):
-    design, out = undisturbed
-    wrong, new = tmp_path / "wrong.toml", tmp_path / "new"
-    wrong.write_text(design.read_text().replace("rtol = 1e-6", "rtol = 6.0"))
-    places = {"design": design, "out": out, "new": new, "wrong": wrong}
-    refused(capsys, words, "sweep", *(argument.format(**places) for argument in arguments))
-    assert not new.exists()
 
 
 def test_the_example_is_a_sweep():

@@ -1,6 +1,5 @@
 """Many throws at once equal one at a time, to the last bit."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -69,31 +68,6 @@ def test_results_cannot_be_written():
 def test_any_iterable_of_scenarios_will_do():
     throws = (Scenario(n_slices=n) for n in (1, 2, 3))
     assert [one.scenario.n_slices for one in solve_batch(throws, steps=5)] == [1, 2, 3]
-
-
-@pytest.mark.parametrize(
-    ("scenarios", "arguments", "error", "words"),
-    [
-        ([], {}, ValueError, ["scenarios is empty"]),
-        (Scenario(), {}, TypeError, ["one Scenario", "list"]),
-        ([Scenario(), Bottle()], {}, ValueError, ["scenarios[1] = Bottle(", "is not a slicemodel.Scenario"]),
-        ([Scenario(), None], {}, ValueError, ["scenarios[1] = None"]),
-        ([Scenario()], {"scheme": "exact"}, ValueError, ["scheme = 'exact'", "did you mean"]),
-        ([Scenario()], {"steps": 1}, ValueError, ["steps = 1", "[2, "]),
-        ([Scenario()], {"rebound": "never"}, ValueError, ["rebound = 'never'"]),
-        ([Scenario()], {"scheme": "published-python", "rebound": "in-step"}, ValueError, ["exact roots"]),
-        ([Scenario()], {"jobs": 0}, ValueError, ["jobs = 0", "[1, 1024]"]),
-        ([Scenario()], {"jobs": 1.5}, ValueError, ["jobs = 1.5", "whole number"]),
-        ([Scenario()], {"jobs": math.nan}, ValueError, ["jobs = nan"]),
-        ([Scenario()] * 1000, {"steps": 10**6}, ValueError, ["29.8 GiB", "solve fewer"]),
-    ],
-)
-def test_bad_arguments_are_named_in_one_line(scenarios, arguments, error, words):
-    with pytest.raises(error) as refusal:
-        solve_batch(scenarios, **arguments)
-    assert "\n" not in str(refusal.value)
-    for word in words:
-        assert word in str(refusal.value)
 
 
 def test_a_fault_in_one_throw_reaches_the_caller(monkeypatch):

@@ -158,14 +158,6 @@ def test_a_slice_that_is_put_on_the_cap_does_not_strike_it(scheme, slices):
     assert (run.r[1:, -1] == scenario.r_min).sum() > 10
 
 
-def test_only_exact_roots_know_their_path_inside_a_step():
-    with pytest.raises(ValueError, match=r"exact roots \(roots-corrected, exact-step, midpoint\)") as e:
-        slicemodel.solve(Scenario(n_slices=2), "published-python", rebound="in-step")
-    assert "published-python" in str(e.value)
-    with pytest.raises(ValueError, match="did you mean 'in-step'"):
-        slicemodel.solve(Scenario(n_slices=2), rebound="instep")
-
-
 def test_defaults_of_rebound():
     assert slicemodel.solve(Scenario(n_slices=2), "midpoint").settings["rebound"] == "in-step"
     assert slicemodel.solve(Scenario(n_slices=2), "exact-step").settings["rebound"] == "grid"

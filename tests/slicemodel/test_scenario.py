@@ -36,39 +36,6 @@ def test_is_frozen_and_keyword_only():
         Bottle(0.28)
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"water_mass": 1.4}, ["water_mass = 1.4 kg", "capacity 1.0 kg"]),
-        ({"water_mass": 0.0}, ["water_mass = 0.0 kg", "[1e-15, 1e+15]"]),
-        ({"water_mass": -0.1}, ["water_mass = -0.1 kg"]),
-        ({"n_slices": 0}, ["n_slices = 0", "[1, 10000000]"]),
-        ({"n_slices": 10**9}, ["n_slices = 1000000000", "[1, 10000000]"]),
-        ({"drag": 10**400}, ["drag = inf kg/s", "[0, 1e+15]"]),
-        ({"n_slices": 2.5}, ["n_slices = 2.5", "whole number"]),
-        ({"n_slices": True}, ["n_slices = True"]),
-        ({"drag": -1e-9}, ["drag = -1e-09 kg/s", "[0, 1e+15]"]),
-        ({"drag": "much"}, ["drag = 'much'", "not a number"]),
-        ({"restitution": 1.01}, ["restitution = 1.01", "[0, 1]"]),
-        ({"restitution": -0.5}, ["restitution = -0.5", "[0, 1]"]),
-        ({"omega0": 0}, ["omega0 = 0.0 rad/s does not spin", "[1e-15, 1e+15]"]),
-        ({"duration": 0.0}, ["duration = 0.0 s", "[1e-15, 1e+15]"]),
-        ({"gravity": -9.81}, ["gravity = -9.81 m/s^2", "[0, 1e+15]"]),
-        ({"theta0": math.inf}, ["theta0 = inf rad", "[-12.5664, 12.5664]"]),
-        ({"launch_velocity": (1.0, math.nan)}, ["launch_velocity.y = nan m/s"]),
-        ({"launch_velocity": (1.0,)}, ["launch_velocity = (1.0,)", "pair"]),
-        ({"launch_velocity": "12"}, ["launch_velocity = '12'", "pair"]),
-        ({"frozen": 1}, ["frozen = 1"]),
-        ({"bottle": None}, ["bottle = None"]),
-    ],
-)
-def test_impossible_values_are_refused_by_field_value_and_range(changes, words):
-    with pytest.raises(ScenarioError) as refusal:
-        Scenario(**changes)
-    for word in words:
-        assert word in str(refusal.value)
-
-
 ABSURD = (5e-324, 1e-300, 1e-16, 1e16, 1e200, 1e308, math.inf)
 NUMBERS = [field.name for field in dataclasses.fields(Scenario) if isinstance(field.default, float)]
 LENGTHS = [field.name for field in dataclasses.fields(Bottle)]
@@ -91,19 +58,6 @@ def test_absurd_numbers_are_refused_by_name_or_harmless(value):
         else:
             with pytest.raises(ScenarioError, match=rf"^{name} = {re.escape(repr(value))} .*\[.*\]"):
                 Scenario(**{name: value})
-
-
-@pytest.mark.parametrize("field", LENGTHS)
-@pytest.mark.parametrize("value", [0.0, -1.0, "1", None])
-def test_no_bottle_is_impossible(field, value):
-    with pytest.raises(ScenarioError, match=rf"bottle\.{field}"):
-        Bottle(**{field: value})
-
-
-@pytest.mark.parametrize("document", ["x", 5, None, [("scenario", {})]])
-def test_what_is_no_mapping_is_refused_by_its_source(document):
-    with pytest.raises(ScenarioError, match=r"^here: .* is not a mapping of the tables"):
-        Scenario.from_mapping(document, source="here")
 
 
 def test_a_launch_velocity_may_come_from_a_generator():

@@ -173,27 +173,6 @@ def test_the_other_spin_is_the_mirror_image():
     np.testing.assert_allclose(other.r, one.r, rtol=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"scenario": None}, ["scenario = None is not a slicemodel.Scenario"]),
-        ({"scheme": ["midpoint"]}, ["scheme = ['midpoint'] is unknown", "did you mean 'midpoint'?"]),
-        ({"lagged": "a"}, ["lagged = 'a' is not True or False"]),
-        ({"scheme": "exact-stepp"}, ["scheme = 'exact-stepp'", "did you mean 'exact-step'?"]),
-        ({"scheme": "zzz"}, ["scheme = 'zzz'", "known: published-python"]),
-        ({"steps": 1}, ["steps = 1", "[2, 1000000000]"]),
-        ({"steps": 100_000_000}, ["29.8 GiB", "store = 'summary'"]),
-        ({"steps": 10.0}, ["steps = 10.0", "whole number"]),
-        ({"store": "none"}, ["store = 'none'", "full, summary"]),
-    ],
-)
-def test_bad_arguments_are_named(arguments, words):
-    with pytest.raises(ValueError) as refusal:  # noqa: PT011 - the words are checked below
-        slicemodel.solve(**{"scenario": SMALL} | arguments)
-    for word in words:
-        assert word in str(refusal.value)
-
-
 def test_a_throw_beyond_floating_point_ends_at_its_last_finite_point():
     trajectory = slicemodel.solve(Scenario(n_slices=3, omega0=1e15, duration=1.0), steps=10)
     assert trajectory.status == "overflow"

@@ -1,33 +1,10 @@
 """What ``required_steps`` refuses; that it keeps its promise stands in the cross-validation."""
 
-import math
-
 import pytest
 
 from slicemodel import Scenario, required_steps
 
 SMALL = Scenario().with_slices(5)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        *(((tolerance,), r"tolerance = .* is outside \(0, 1\)") for tolerance in (0.0, -1e-3, 1.0, math.nan, math.inf)),
-        *(((tolerance,), r"tolerance = .* is not a number \(admissible: \(0, 1\)") for tolerance in ("small", True)),
-        ((1e-3, "midpont"), "did you mean 'midpoint'"),
-        ((1e-3, ["midpoint"]), r"scheme = \['midpoint'\] is unknown"),
-        # Its slices escape.
-        ((1e-3, "published-matlab"), "published-matlab has no step size to ask for on this throw: "),
-    ],
-)
-def test_what_has_no_answer_is_refused_by_name(arguments, words):
-    with pytest.raises(ValueError, match=words):
-        required_steps(SMALL, *arguments)
-
-
-def test_what_is_no_throw_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"scenario = None is not a slicemodel\.Scenario"):
-        required_steps(None, 0.1)
 
 
 def test_a_tolerance_out_of_reach_is_said_so(monkeypatch):

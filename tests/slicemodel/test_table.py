@@ -1,8 +1,8 @@
-"""Table, touch and outcome: what they refuse, and that a touch is the flight it was taken from."""
+"""Table, touch and outcome: they cannot be changed, and a touch is the flight it was taken from."""
 
 import math
 import pickle
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
@@ -16,25 +16,11 @@ THROW = Scenario(n_slices=20, omega0=16.0)
 TABLE = Table(height=-0.36)
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"restitution": 1.1}, r"table.restitution = 1.1 is outside \[0, 1\]"),
-        ({"restitution": -0.1}, r"table.restitution = -0.1 is outside \[0, 1\]"),
-        ({"restitution": math.nan}, r"table.restitution = nan is outside \[0, 1\]"),
-        ({"friction": -0.4}, r"table.friction = -0.4 is outside \[0, 1e\+15\]"),
-        ({"height": math.inf}, r"table.height = inf m is outside \[-1e\+15, 1e\+15\]"),
-        ({"height": "low"}, r"table.height = 'low' is not a number"),
-    ],
-)
-def test_a_table_is_refused_by_field_and_range(changes, words):
-    with pytest.raises(ScenarioError, match=words):
-        Table(**({"height": 0.0} | changes))
-
-
-def test_all_problems_of_a_table_are_told_at_once():
+def test_all_problems_are_told_at_once():
     with pytest.raises(ScenarioError, match=r"restitution = 2.*friction = -1"):
         Table(height=0.0, restitution=2, friction=-1)
+    with pytest.raises(ScenarioError, match=r"touch\.velocity = .*; touch\.v = "):
+        good(velocity=(1,), v="abcd")
 
 
 def good(**changes):
@@ -53,36 +39,6 @@ def good(**changes):
     )
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"theta": math.nan}, "touch.theta = nan rad"),
-        ({"velocity": (math.inf, 0.0)}, "touch.velocity.x = inf m/s"),
-        *(
-            ({"velocity": wrong}, "touch.velocity = .* is not a pair .* of numbers in m/s")
-            for wrong in ((1,), 1.0, "12", None, (1, 2, 3))
-        ),
-        *(
-            ({name: wrong}, rf"touch.{name} = .* is not an array of numbers")
-            for name in ("r", "v")
-            for wrong in ("abcd", ["a"] * 20, [[1.0], [1.0, 2.0]], {})
-        ),
-        ({"velocity": (1,), "v": "abcd"}, "touch.velocity = .*; touch.v = "),
-        ({"r": np.zeros(3)}, r"touch.r has shape \(3,\), not \(20,\)"),
-        ({"v": np.full(20, math.nan)}, r"touch.v\[0\] = .*nan.* is not finite"),
-        ({"r": np.full(20, 0.3)}, r"touch.r\[0\] = 0.3 m is outside \[0, 0.28\]"),
-        (
-            {"scenario": replace(THROW, gravity=0.0)},
-            r"touch.scenario.gravity = 0.0 m/s\^2 is outside \[1e-15, 1e\+15\]",
-        ),
-        ({"scenario": replace(THROW, frozen=True), "v": np.ones(20)}, "touch.v is not 0 everywhere"),
-    ],
-)
-def test_a_touch_is_refused_by_field_and_range(changes, words):
-    with pytest.raises(ScenarioError, match=words):
-        good(**changes)
-
-
 def test_a_touch_cannot_be_changed():
     start = good()
     with pytest.raises(FrozenInstanceError):
@@ -91,22 +47,6 @@ def test_a_touch_cannot_be_changed():
         start.r[0] = 0.0
     assert start.tilt == pytest.approx(0.1)
     assert good(theta=0.1 - 4 * math.pi).tilt == pytest.approx(0.1, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"outcome": "standing"}, "outcome = 'standing' is unknown"),
-        ({"outcome": "undecided", "reason": ""}, "reason is empty"),
-        ({"margin": 0.0}, "margin = 0.0 at 0.2 s does not certify"),
-        ({"certified": None}, "does not certify"),
-        ({"margin": math.nan}, "does not certify"),
-    ],
-)
-def test_an_outcome_needs_its_certificate(changes, words):
-    fields = {"outcome": "upright", "certified": 0.2, "margin": 0.1, "solver": "x", "method": "y"}
-    with pytest.raises(ValueError, match=words):
-        Outcome(**(fields | changes))
 
 
 def test_an_outcome_can_be_sent_home():

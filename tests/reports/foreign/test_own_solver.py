@@ -61,28 +61,6 @@ def test_certify_writes_passport_and_verdicts_and_says_so(folder, capsys, monkey
     assert run(capsys, "certify", "mine.py:solve")[0] == 1
 
 
-@pytest.mark.usefixtures("folder")
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("certify", "nowhere.py:solve"), "there is no file nowhere.py"),
-        (("certify", "eq8", "--equation", "eq9"), "equation = 'eq9'"),
-        (("certify", "eq8", "--json", "no/such/p.json"), "--json no/such/p.json: the folder no/such does not exist"),
-        (("certify", "math:no_such"), "cannot be loaded: AttributeError"),
-        (("place", "eq9"), "'eq9'"),
-        (("explain", "eq8", "csv:x.csv"), "a curve cannot be asked"),
-        (("certify", "csv:."), "holds something else than questions"),
-        (("simulate", "--solver", "mine.py:solve", "--steps", "5"), "is not a scheme"),
-        (("simulate", "--solver", "nowhere.py:solve"), "there is no file nowhere.py"),
-    ],
-)
-def test_bad_input_is_one_line(capsys, arguments, said):
-    status, out, err = run(capsys, *arguments)
-    assert (status, out) == (2, "")
-    assert said in err
-    assert len(err.splitlines()) == 1
-
-
 def test_a_solver_that_does_not_answer_the_throws_is_said_so(capsys):
     status, out, _ = run(capsys, "place", "published-matlab")
     assert status == 1
@@ -138,31 +116,3 @@ def test_box2d_has_a_threshold_at_1_m_s_and_a_float32_floor():
     for _, digits, floor in found.values():
         assert digits.observation.facts["arithmetic"] == "float32"
         assert len(floor.observation.facts["changes"]) <= 2
-
-
-@pytest.mark.usefixtures("folder")
-def test_a_solver_that_cannot_be_loaded_is_no_solver_off_the_lattice(capsys):
-    for command in ("place", "certify"):
-        status, out, err = run(capsys, command, "mine.py:nope")
-        assert (status, out) == (2, "")
-        assert "mine.py:nope cannot be loaded" in err
-        assert "throws" not in err
-
-
-def test_a_folder_of_questions_that_cannot_be_made_is_refused_in_words(tmp_path, capsys):
-    (tmp_path / "file").write_text("theirs")
-    status, _, err = run(capsys, "certify", f"csv:{tmp_path / 'file' / 'answers'}")
-    assert status == 2
-    assert "answers cannot be written (Not a directory)" in err
-    assert "Errno" not in err
-
-
-def test_a_drag_that_other_slices_make_too_large_is_said_as_it_was_given(tmp_path, capsys):
-    from slicemodel import Scenario
-
-    (tmp_path / "big.toml").write_text(Scenario(n_slices=5, drag=1e15).to_toml())
-    given = ["simulate", str(tmp_path / "big.toml"), "--slices", "3", "--out", str(tmp_path / "x.csv")]
-    status, _, err = run(capsys, *given)
-    assert status == 2
-    assert "drag = 1666666666666666.8 kg/s is outside [0, 1e+15]" in err
-    assert "drag = 1e+15 kg/s of 5 slices was given" in err

@@ -1,8 +1,7 @@
-"""The example exports, what ``track`` refuses of them, and ``export``."""
+"""The example exports, and ``export``."""
 
 import importlib.util
 import math
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from slicemodel import Scenario
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "tracker"
 TRACKED = sorted(path.name for path in EXAMPLES.iterdir() if path.suffix in (".txt", ".csv"))
-BOTH = ("--cap", "cap", "--base", "base", "--length-unit", "m")
 
 
 @pytest.fixture(scope="module")
@@ -97,40 +95,6 @@ def test_slow_motion_is_mended_by_the_frame_rate(tmp_path):
     assert np.diff(one.t) == pytest.approx(1 / 240, rel=1e-3, abs=0.0)
 
 
-REFUSED = {
-    "no unit": (("--cap", "cap", "--base", "base"), "does not state the unit of x and y; .* --length-unit m, cm, mm"),
-    "unknown unit": ((*BOTH[:5], "inch"), "length_unit = 'inch' is unknown"),
-    "unknown track": (("--cap", "cop", *BOTH[2:]), "track 'cop' is unknown; did you mean 'cap'"),
-    "one track": (BOTH[:2], "--cap and --base"),
-    "frame rate": ((*BOTH, "--frame-rate", "0"), "frame_rate = 0 1/s is outside"),
-    "twice": ((EXAMPLES / "tab.txt", *BOTH), r"tab\.txt is there twice"),
-    "no tracks named": ((), "has no column t; .* needs --cap and --base"),
-    "several": ((EXAMPLES / "single_cap.txt",), "several files: .* fit --each takes several films of one bottle"),
-    "release": ((*BOTH, "--release", "9"), r"--release 9 s is no time of this film, which runs from 0 to \d"),
-    "landing": ((*BOTH, "--landing", "-1"), "--landing -1 s is no time of this film"),
-    "order": ((*BOTH, "--release", "0.5", "--landing", "0.4"), "landing = 0.4 s does not follow release = 0.5 s"),
-}
-
-
-@pytest.mark.parametrize(("arguments", "words"), REFUSED.values(), ids=REFUSED)
-def test_refusals_of_track(arguments, words):
-    with pytest.raises(ValueError, match=words) as refusal:
-        run("track", EXAMPLES / "tab.txt", *arguments)
-    assert "\n" not in str(refusal.value)
-
-
-def test_track_touches_no_foreign_folder(tmp_path):
-    (tmp_path / "letter.txt").write_text("mine", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"holds letter\.txt and not flipproof's own marker"):
-        run("track", EXAMPLES / "tab.txt", *BOTH, "--out", tmp_path)
-
-
-def test_the_folder_of_what_is_read_is_not_written(tmp_path):
-    shutil.copy(EXAMPLES / "tab.txt", tmp_path / "tab.txt")
-    with pytest.raises(ValueError, match=r"holds tab\.txt, which this command reads; name another"):
-        run("track", tmp_path / "tab.txt", *BOTH, "--out", tmp_path)
-
-
 def exported(tmp_path, *arguments):
     path = tmp_path / "flight.txt"
     throw = tmp_path / "throw.toml"
@@ -191,36 +155,3 @@ def test_export_stops_on_the_table(tmp_path, capsys):
 def test_export_to_standard_output(capsys):
     assert run("export", "--solver", "exact-step", "--slices", 5, "--frame-rate", 10) == 0
     assert len(capsys.readouterr().out.splitlines()) == 7
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        *(
-            (("--frame-rate", wrong), rf"frame_rate = {float(wrong)!r} 1/s is outside \[1, 100000\]")
-            for wrong in ("0", "1e6", "nan")
-        ),
-        (("--out", "/none/where.txt"), "the folder /none does not exist"),
-        (("--out", str(EXAMPLES)), "is a folder; name a file"),
-    ],
-)
-def test_refusals_of_export(arguments, words, monkeypatch):
-    monkeypatch.setattr("flipproof.frame.solvers.solve", lambda *_: pytest.fail("solved before the refusal"))
-    with pytest.raises(ValueError, match=words):
-        run("export", "--solver", "exact-step", "--slices", 5, *arguments)
-
-
-def test_a_duration_of_too_many_frames_is_named(tmp_path):
-    (tmp_path / "long.toml").write_text("[scenario]\nduration = 1e15\n")
-    with pytest.raises(ValueError, match=r"duration = 1e\+15 s at 240 frames/s .* up to 4166.67 s"):
-        run("export", tmp_path / "long.toml", "--solver", "exact-step")
-
-
-@pytest.mark.parametrize(
-    "arguments", [("--start", "soon"), ("--origin", "1;2"), ("--origin", "1,x"), ("--start", "nan")]
-)
-def test_arguments_that_are_no_numbers(arguments, capsys):
-    with pytest.raises(SystemExit) as exit_status:
-        run("export", "--solver", "exact-step", *arguments)
-    assert exit_status.value.code == 2
-    assert "is not" in capsys.readouterr().err
