@@ -107,6 +107,7 @@ def check_start(traits: Traits) -> CheckGenerator:
                 hint += "; so small an error is the rounding of single precision: keep places and J in float64"
     if worst == "theta" and whole_turns(answer.theta[0] - throw.theta0, 1e-6):
         hint = WRAPPED
+    stacked = answer.r is not None and ask is asks[-1] and np.allclose(answer.r[0], asks[0].start, rtol=0.0, atol=bound)
     initial = {"theta": (throw.theta0, answer.theta), "omega": (throw.omega0, answer.omega)}
     few_digits = _digits_advice(worst, initial[worst][0], float(initial[worst][1][0])) if worst in initial else ""
     if worst in initial and abs(initial[worst][1][0] + initial[worst][0]) <= bound * max(1.0, abs(initial[worst][0])):
@@ -122,7 +123,10 @@ def check_start(traits: Traits) -> CheckGenerator:
         expected=f"theta_0, omega_0 and start within {bound:.1g}",
         observed=f"{worst} off by {errors[worst]:.2g}" + (f", as if it were {delay:.2g} s later" if drifted else ""),
         where=f"t = 0 s, theta_0 = {throw.theta0:.3g} rad, omega_0 = {throw.omega0:g} rad/s",
-        advice=few_digits
+        advice="r(0) is the stack on the base whatever start is asked: begin at ask.start"
+        + ("; cache nothing by throw: the start is part of the question" if worst == "r" else "")
+        if stacked
+        else few_digits
         + ("answer at ask.times themselves; " if drifted and not few_digits else "")
         + ("omega is that of the instant, not a slope of theta between two times; " if from_slope else "")
         + ("omega(0) is omega_0 from every start: compute J_0 from ask.start; " if cached and worst == "omega" else "")
@@ -176,14 +180,16 @@ def check_determinism(traits: Traits) -> CheckGenerator:
     )
 
 
+READ: Final = "read it from the question, and keep no answer under a part of the question"
+
 IGNORED: Final[Mapping[str, str]] = {
-    "another restitution": "; or no slice strikes an end, or each that does stays there at once: look at what moves "
-    "them, and at when a slice begins to rest",
-    "another capacity of the bottle": "; the capacity gives the height of a slice, by half of which its places end "
-    "before the ends of the bottle",
-    "another radius of the bottle": "; the radius acts in J alone, by M_b (R^2/2 + L^2/12)",
+    "another restitution": f"{READ}; or no slice strikes an end, or each that does stays there at once: look at what "
+    "moves them, and at when a slice begins to rest",
+    "another capacity of the bottle": "slices turn half their height before the ends, at h/2N and L - h/2N, and the "
+    f"capacity gives that height: {READ}",
+    "another radius of the bottle": f"the radius acts in J alone, by M_b (R^2/2 + L^2/12): {READ}",
 }
-"""What to look at besides, if this alone is ignored."""
+"""What to look at if this alone is ignored."""
 
 
 def check_inputs(traits: Traits) -> CheckGenerator:
@@ -236,8 +242,7 @@ def check_inputs(traits: Traits) -> CheckGenerator:
             if "another order of the start" in ignored
             else ""
         )
-        + "read it from the question, and keep no answer under a part of the question"
-        + (IGNORED.get(ignored[0], "") if len(ignored) == 1 else ""),
+        + (IGNORED.get(ignored[0], READ) if len(ignored) == 1 else READ),
     )
 
 

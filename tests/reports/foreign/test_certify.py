@@ -596,6 +596,15 @@ def test_a_question_without_an_answer_stands_beside_the_error():
     assert results[1].verdict == PASSED
 
 
+def test_a_start_that_is_not_read_is_told_by_r():
+    class OwnStart(Exact):
+        def solve(self, ask):
+            return super().solve(replace(ask, start=ask.scenario.initial_positions()))
+
+    (result,) = certify(InProcess(OwnStart(), "x"), ["start"]).results
+    assert "; r(0) is the stack on the base whatever start is asked: begin at ask.start" in result.text
+
+
 @pytest.mark.parametrize(("apart", "verdict"), [(0.0, PASSED), (1e-3, FAILED)])
 def test_of_impacts_at_one_instant_the_recoil_may_send_one_off_faster(apart, verdict):
     class Together(Exact):
