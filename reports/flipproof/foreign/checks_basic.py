@@ -30,7 +30,7 @@ from flipproof.foreign.checking import (
     times_of,
     whole_turns,
 )
-from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
+from flipproof.foreign.contract import IMPACT, Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
 from flipproof.frame.solvers import solve
@@ -600,7 +600,9 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     answer, *finer = yield [ask_of(traits, THROW, level) for level in ((0, 2) if lags else (0,))]
     bound = max(2e-5, 64 * traits.epsilon)  # six printed digits are right
     given = [name for name in DEFINED if name in answer.given]
-    if (hits := answer.impacts) is not None and len(hits):
+    if answer.impacts is not None and len(answer.impacts):
+        in_time = np.argsort(answer.impacts.time, kind="stable")  # they come in any order
+        hits = Impacts(**{name: getattr(answer.impacts, name)[in_time] for name in IMPACT})
         error = np.abs(hits.speed_after - THROW.restitution * hits.speed_before) * (hits.speed_after > 0)
         # Of several that strike at one instant, the recoil may send one off faster than its own rebound.
         near = np.abs(np.diff(hits.time, prepend=-np.inf, append=np.inf)) < 1e-9 * THROW.duration

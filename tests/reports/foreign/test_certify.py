@@ -609,7 +609,8 @@ def test_a_start_that_is_not_read_is_told_by_r():
 def test_of_impacts_at_one_instant_the_recoil_may_send_one_off_faster(apart, verdict):
     class Together(Exact):
         def spoilt(self, _throw, answer):
-            return answer | {"impacts": [(0.2, 0, 1, 0.4, 0.2), (0.2 + apart, 1, 1, 0.02, 0.3)]}
+            others = [(0.15, 2, 1, 0.4, 0.2), (0.2 + apart, 1, 1, 0.02, 0.3)]
+            return answer | {"impacts": [(0.2, 0, 1, 0.4, 0.2), *others]}  # in no order of time
 
     (result,) = certify(InProcess(Together(), "x"), ["definitions"]).results
     assert result.verdict == verdict
