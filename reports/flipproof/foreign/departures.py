@@ -370,9 +370,10 @@ def _describe(equation: str, intervals: Sequence[Interval], departs: BoolArray) 
     """
     total = int(departs.sum())
     category, look_at, members = "", "", np.ones(len(intervals), dtype=bool)
+    categories = _categories_of(intervals) | _slow_rebounds(intervals, departs)
     for min_share in (1.0, SURE):
         best = 2 * total / (len(intervals) + total)  # as good as all intervals
-        for name, (holds, key) in (_categories_of(intervals) | _slow_rebounds(intervals, departs)).items():
+        for name, (holds, key) in categories.items():
             inside = np.array([holds(interval) for interval in intervals])
             common = int(np.sum(inside & departs))
             score = 2 * common / (int(inside.sum()) + total) - (0.0 if key else UNTOLD)
