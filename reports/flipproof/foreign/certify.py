@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from flipproof.foreign import checks_basic, checks_measured, elsewhere
+from flipproof.foreign import checks_answers, checks_laws, checks_measured, checks_questions, elsewhere
 from flipproof.foreign.checking import Check, NotApplicableError, Observation, drive
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
 from flipproof.frame.columns import json_ready
@@ -29,25 +29,25 @@ WAITING: Final = "waiting"
 
 CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
     {
-        "shape": checks_basic.check_shape,
+        "shape": checks_questions.check_shape,
         "digits": checks_measured.check_digits,
-        "determinism": checks_basic.check_determinism,
-        "start": checks_basic.check_start,
-        "inputs": checks_basic.check_inputs,
+        "determinism": checks_questions.check_determinism,
+        "start": checks_questions.check_start,
+        "inputs": checks_questions.check_inputs,
         "refinement": checks_measured.check_refinement,
-        "ice": checks_basic.check_ice,
-        "published-vectors": checks_basic.check_vectors,
-        "definitions": checks_basic.check_definitions,
-        "velocity": checks_basic.check_velocity,
+        "ice": checks_answers.check_ice,
+        "published-vectors": checks_laws.check_vectors,
+        "definitions": checks_answers.check_definitions,
+        "velocity": checks_answers.check_velocity,
         "piecewise": checks_measured.check_piecewise,
-        "angular-momentum": checks_basic.check_momentum,
-        "angle": checks_basic.check_angle,
-        "times": checks_basic.check_times,
+        "angular-momentum": checks_laws.check_momentum,
+        "angle": checks_answers.check_angle,
+        "times": checks_questions.check_times,
         "restitution": checks_measured.check_restitution,
-        "equation": checks_basic.check_equation,
-        "gravity": checks_basic.check_gravity,
-        "mirror": checks_basic.check_mirror,
-        "moving-frame": checks_basic.check_moving_frame,
+        "equation": checks_laws.check_equation,
+        "gravity": checks_laws.check_gravity,
+        "mirror": checks_laws.check_mirror,
+        "moving-frame": checks_laws.check_moving_frame,
         "order-before-impacts": checks_measured.check_order_before,
         "order-across-impacts": checks_measured.check_order_across,
         "precision-floor": checks_measured.check_floor,

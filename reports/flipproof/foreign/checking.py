@@ -94,6 +94,21 @@ def refined_words(traits: Traits) -> str:
     return words[traits.refined_by or "dt"]
 
 
+def refined_asks(traits: Traits, points: int = 61) -> list[Ask]:
+    """Return the ask for the throw and, if the solver can be refined, the same at a quarter of the step."""
+    return [ask_of(traits, THROW, level, points) for level in ((0, 2) if traits.refined_by else (0,))]
+
+
+def falls_with_step(sizes: Sequence[float], min_ratio: float = 3.0) -> bool:
+    """Return whether a change falls by ``min_ratio`` in two levels of refinement: then it is a step's own error."""
+    return len(sizes) > 1 and sizes[-1] * min_ratio <= sizes[0]
+
+
+def refined_text(traits: Traits, sizes: Sequence[float], unit: str = "") -> str:
+    """Return the size at the finer level as a phrase that follows the first; empty if there is none."""
+    return f", {sizes[-1]:.2g}{unit} at {refined_words(traits)}" if len(sizes) > 1 else ""
+
+
 def shift(first: Answer, second: Answer, scale: float) -> float:
     """Return the largest difference of two curves omega(t), as a fraction of ``scale``."""
     return float(np.max(np.abs(first.omega - second.omega)) / abs(scale))

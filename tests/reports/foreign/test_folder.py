@@ -12,7 +12,7 @@ import pytest
 
 from flipproof.cli.main import main
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, WAITING, WEAK, certify
-from flipproof.foreign.checks_basic import ask_of_vector
+from flipproof.foreign.checks_laws import ask_of_vector
 from flipproof.foreign.contract import Ask, Traits
 from flipproof.foreign.files import Folder
 from flipproof.foreign.solving import opened
