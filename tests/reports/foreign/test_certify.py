@@ -1,9 +1,11 @@
 """Every check passes a good solver and fails one with the mistake it is there for; verdicts, counts, passport."""
 
+import csv
 import json
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import made_up
 import numpy as np
@@ -806,227 +808,32 @@ def test_the_first_check_that_fails_is_the_one_that_tells(mistake, check):
     assert [r.check for r in found.failed] == [check]
 
 
-@pytest.mark.parametrize(
-    ("mistake", "check", "advice"),
-    [
-        ("theta0_ignored", "start", "begin at scenario.theta0"),
-        ("cached_by_number_of_slices", "determinism", "keep nothing under a part of the throw"),
-        ("ice_starts_at_zero", "ice", "let theta go on from theta_0"),
-        ("answers_cached_without_start", "start", "cache nothing by throw"),
-        ("restitution_hardcoded", "inputs", "with another restitution"),
-        ("tolerance_of_the_module", "refinement", "or declare no refined_by"),
-        ("adaptive_leaves_off_just_before_answer", "velocity", "theta stands still between two of the times asked"),
-        ("fixed_omega_from_differences", "start", "not a slope of theta"),
-        ("heun3_ice_once_ice_always", "determinism", "reset all state between asks"),
-        ("cashkarp_ends_exchanged_in_impacts", "definitions", "look at the sign of the end"),
-        ("blanesmoan_speeds_exchanged_in_impacts", "definitions", "as if the speeds before and after were exchanged"),
-        pytest.param("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating", marks=pytest.mark.slow),
-        pytest.param(
-            "halving_released_level", "mirror", "right without weight: look at the weight", marks=pytest.mark.slow
-        ),
-    ],
-)
-def test_the_first_failure_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    solver = next(mistakes[mistake] for mistakes in LISTS.values() if mistake in mistakes).solver()
-    found = certify(InProcess(solver, mistake), until_failed=True)
-    assert [r.check for r in found.failed] == [check]
-    assert advice in found.results[-1].line
+ADVICE = [*csv.DictReader(Path(__file__).with_name("advice.csv").read_text(encoding="utf-8").splitlines())]
+"""Words that a line must have: mistake; asked ("all checks" up to the first failure, "one check", or "throw k" of
+``PIECES``); the check that fails; whether it runs on the push or is slow; and the words."""
 
 
 @pytest.mark.parametrize(
-    ("mistake", "check", "advice"),
+    "row",
     [
-        ("answers_cached_without_start", "inputs", "keep no answer under a part of the question"),
-        ("remembered_by_the_mean_of_the_start", "inputs", "with another start of the same mean"),
-        ("closed_form_momentum_remembered", "start", "compute J_0 from ask.start"),
-        ("at_most_two_hundred_steps", "times", "right where outputs lie close: look at what goes on between two"),
-        ("rest_from_a_fiftieth", "refinement", "right through impacts as long as no slice rests: look at rests"),
-        ("throw_read_to_four_digits", "start", "theta_0 has only 4 digits: read the throw"),
-        ("six_decimals", "definitions", "inertia has 6 decimals, which are few digits"),
-        ("fixed_grid_of_its_own_interpolated", "angle", "instead of interpolating"),
-        ("whole_steps_only", "angle", "theta stands still between two of the times asked"),
-        ("cash_karp_digits_swapped", "ice", "look for weights that do not add up to 1"),
-        ("scalar_omega_of_the_last_step", "angle", "answer the omega of the same instant"),
-        ("kutta3_slices_with_an_inertia_of_their_own", "definitions", "M_b (R^2/2 + L^2/12) counts 1.25 times"),
-        ("sdirk_positions_in_single_precision", "start", "the rounding of single precision: keep places and J"),
-        ("expint_two_sweeps", "order-before-impacts", "and whether an iteration with it converges"),
-        (
-            "position_verlet_drag_of_the_old_speed",
-            "order-before-impacts",
-            "of that order without drag: look at the instant",
-        ),
-        ("equal_step_weights", "order-before-impacts", "where output times cut steps unevenly"),
-        ("straight_line_across_the_step", "order-before-impacts", "or answer between two steps at the order of the"),
-        ("lists_speeds_by_differences", "velocity", "not a slope of r from one of them to the next"),
-        *(
-            pytest.param(*each, marks=pytest.mark.slow)
-            for each in (
-                ("unit_vector_unwraps_between_outputs", "angle", "theta is off by whole turns"),
-                ("spins_one_way_released_at_first_output", "angle", "the flight begins at t = 0, not at the first"),
-                ("spin_only_thousand_steps", "angle", "look for a largest number of steps"),
-            )
-        ),
-        ("remembered_in_any_order", "inputs", "with another order of the start"),
-        ("midpoint_stale_inertia", "definitions", "it is that of the output before"),
-        ("by_angle_row_before", "velocity", "r is that of the output before"),
-        ("taylor_speed_after", "definitions", "off by 0.5 of the largest speed"),
-        ("taylor_sorts_start", "inputs", "slices keep the order of ask.start"),
         pytest.param(
-            "dense853_mean_of_water",
-            "piecewise",
-            "drag is taken against mean(v), the mean velocity of the water",
-            marks=pytest.mark.slow,
-        ),
-        ("frozen_grid_solid_cylinder", "angular-momentum", "M_b (R^2/2 + L^2/12) counts 0.945 times"),
-        ("frozen_grid_ice_from_upright", "ice", "at all later times: let theta go on from theta_0"),
-        ("frozen_grid_inertia_one_step_late", "angle", "omega is that of 0.00031 s earlier than theta"),
-        ("series_answers_before_the_step", "ice", "theta is that of 0.005 s earlier throughout"),
-        ("kick_drift_ice_does_not_turn", "ice", "ice turns, too, by omega_0 t"),
-        ("series_ice_melts_in_series", "ice", "that no slice moves within a step of ice"),
-        ("series_gravity_of_the_release", "times", "right without weight"),
-        ("series_drag_mean_of_water", "equation", "right without drag: look at the drag, alpha v / m, and against"),
-        ("single_midpoint_v_in_scaled_time", "velocity", "v is 0.05, 1 / omega_0, times dr/dt throughout"),
-        ("angle_rk4_theta_wrapped", "start", "theta is off by whole turns"),
-        ("dopri_no_parallel_axis", "definitions", "M_b (L/2 - r_CM)^2 is missing in J"),
-        ("dopri_dense_output_slope", "velocity", "look at how r and v are answered between two steps"),
-        ("printed_fixed_decimals", "digits", "6 decimals of every number"),
-        pytest.param(
-            "lists_gravity_of_earth", "piecewise", "as if g were 9.81 m/s^2 where it is 0", marks=pytest.mark.slow
-        ),
-        ("picard_first_found_hit", "piecewise", "goes on as if it had not: look at how impacts are found in a step"),
-        ("picard_output_in_cut_pieces", "piecewise", "above all one that an event cuts short"),
-        ("picard_iteration_stops_early", "piecewise", "at iterations that end early"),
-        ("splitter_whole_slice_from_the_end", "start", "right from a start far from the ends: look at the places"),
-        ("doubling_capped_spin_without_sign", "start", "of the other sign: take omega_0 with its sign"),
-        ("bodies853_no_reaction", "definitions", "the reaction of the drag: without drag it is right"),
-        ("bodies853_rest_pull", "definitions", "slices at rest on the bottle: without a slice at rest it is right"),
-        ("bodies853_tube_speed", "definitions", "look at what an impact does to the bottle"),
-        ("bodies853_cap_wall", "definitions", "while a slice is answered on the cap"),
-        ("bodies853_impact_frame", "definitions", "are answered, for in v slices do rebound at e times their speed"),
-        ("bodies853_no_kick", "definitions", "in v, too, slices rebound at 0.0"),
-        ("bodies853_output_of_step_end", "ice", "of another instant each time: answer that of the time asked"),
-        ("hermite_rk4_v_of_centre", "velocity", "for every slice, by the velocity of the common centre of mass"),
-        ("gauss_centre_from_the_base", "definitions", "measure it from the cap"),
-        ("lagrange_coriolis_once", "definitions", "right at release and not from t = 0.015 s on"),
-        ("lagrange_launch_of_tube", "definitions", "at inertial forces, and at the launch velocity"),
-        ("lagrange_recoil_of_all", "definitions", "look at what an impact does to the bottle, and at slices that"),
-        ("gauss_inertia_in_units_of_water", "definitions", "J counts 0.947 times as a whole"),
-        ("gauss_output_on_the_chord", "order-before-impacts", "look at how an answer between two steps is made"),
-        ("rosenbrock_weight_typo", "velocity", "weights of the method, which have to add up to 1"),
-        ("rosenbrock_omega_from_first_answer", "times", "right if t = 0 is asked, too"),
-        ("strang_slow_slices_held_anywhere", "inputs", "as if no slice moved"),
-        ("taylor_momentum_without_radius", "start", "J_0 in J_0 omega_0 is not the J of the start"),
-        ("taylor_no_second_bounce_in_step", "definitions", "and at impacts that a step misses"),
-        ("taylor_angle_wrapped", "piecewise", "theta is off by whole turns: do not wrap it"),
-        pytest.param(
-            "kutta38_theta_wrapped", "angle", "theta is off by whole turns: do not wrap it", marks=pytest.mark.slow
-        ),
-        ("rootfinder_dense_output_sign", "velocity", "r jumps between times asked: look at how r and v"),
-        ("axial_positions_from_first_centre", "angular-momentum", "omega is right, but not J: look at how r is made"),
-        ("axial_momentum_about_tube", "start", "J_0 and J are to have one definition"),
-        (
-            "walldrag_restitution_of_energy",
-            "definitions",
-            "slices leave the cap at 0.707 of their speed, the root of e",
-        ),
-        ("walldrag_tube_kept", "start", "cache nothing by throw: the start is part of the question"),
-        ("limiter_own_inertia_forgotten", "inputs", "the radius acts in J alone, by M_b (R^2/2 + L^2/12)"),
-        ("limiter_water_about_itself", "definitions", "the slices are taken about mean(r) instead of r_CM"),
-        ("limiter_shell_about_water", "definitions", "the bottle is taken about mean(r) instead of r_CM"),
-        ("limiter_theta_euler", "angle", "than theta: advance theta by omega of the middle of a step, not of its"),
-        ("pyport_matlab_epsilon", "published-vectors", "at step 0 r_cm leaves the program: look at the masses"),
-        ("pyport_theta_with_new_omega", "published-vectors", "theta leaves the program: look at with which omega"),
-        ("pyport_mirrored", "published-vectors", "look at the position that a slice beyond an end gets"),
-        ("pyport_velocity_as_printed", "published-vectors", "look at the step of the velocity: it strikes no end"),
-        ("tumbler_rest_speed", "piecewise", "look at the speed below which a slice rests instead of rebounding"),
-        ("labradau_answer_centre_of_water", "start", "as the answered inertia shows"),
-        pytest.param(
-            "bulirsch_mean_of_movers",
-            "piecewise",
-            "its slices accelerate by -1.8 x the drag, alpha (v - v_CM) / m",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "adams_pece_last_impact_first",
-            "piecewise",
-            "whether the earliest of several comes first",
-            marks=pytest.mark.slow,
-        ),
-        ("pyport_slice_at_the_cap", "published-vectors", "the program does not turn it back there"),
-        ("events_reaction_on_total", "equation", "right without drag: look at the drag, alpha v / m, and against"),
-        ("events_dense_digit", "velocity", "look at the coefficients of answers between two steps"),
-        (
-            "collocation_single_precision_weight",
-            "order-before-impacts",
-            "or for single precision; of that order",
-        ),
-        ("collocation_root_truncated", "order-before-impacts", "look for a constant of few digits"),
-        pytest.param(
-            "expint_rests_too_early",
-            "restitution",
-            "where a slice would leave the cap at 0.004 omega_0 L",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "series_rests_too_soon",
-            "restitution",
-            "where a slice would leave the cap at 0.008 omega_0 L",
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            "angle_rk4_sticks_early",
-            "restitution",
-            "where a slice would leave the base at 0.0015 omega_0 L",
-            marks=pytest.mark.slow,
-        ),
-        *(
-            pytest.param(*each, marks=pytest.mark.slow)
-            for each in (
-                ("events_no_drag_as_usual", "piecewise", "is a drag of 0 taken for none given?"),
-                ("three_eighths_forgets_a_light_bottle", "equation", "in which M_b (R^2/2 + L^2/12) counts 0 times"),
-                ("axial_kick_at_tube_centre", "angular-momentum", "right without rests: look at rests"),
-                ("rootfinder_cap_release_without_push", "piecewise", "a slice at rest on the cap is never let go"),
-                ("rootfinder_digit_in_weights", "piecewise", "theta and r advance by 0.9929 of each step"),
-                ("kutta38_spin_held_in_step", "angle", "advance theta by omega of the middle of a step"),
-                ("kutta38_omega_one_step_old", "angle", "s earlier than theta: answer both of one instant"),
-                ("adaptive_a_centimetre_of_play", "elsewhere", "look for a constant in m, kg, kg/s"),
-                ("slices_at_least_a_millimetre", "elsewhere", "look for a constant in m, kg, kg/s"),
-                ("reduced_free_slow_spin_not_scaled", "elsewhere", "look for a constant in rad/s"),
-                ("only_what_moves_is_struck", "restitution", "look at e at the cap, and at the slices that rest"),
-                ("ice_gathers_speed", "elsewhere", "its v is 0 and stays 0"),
-                ("first_found_is_first", "elsewhere", "whether the earliest of several comes first"),
-                ("nearly_full_is_ice", "elsewhere", "look for a least room, or for water that is taken for ice"),
-                ("opposite_hits_cancel", "elsewhere", "slices strike both ends at one"),
-                ("momenta_tube_turns_about_middle", "piecewise", "within a step theta advances with a J in which"),
-                ("momenta_spares_the_resting", "piecewise", "look at the part of slices at rest in the impact of"),
-                ("taylor8_last_eighth", "piecewise", "look at where in a step they are searched for"),
-                ("printed_loses_rest_of_step", "piecewise", "look at the clock, and at the rest of a step"),
-                ("series_cosine_chain", "elsewhere", "look at what goes on within a long step"),
-                ("angle_rk4_impact_at_an_angle", "elsewhere", "look at time, slice, end and number of each"),
-                ("extrapolator_no_restitution_is_a_half", "elsewhere", "and the tube recoils, as if e were 0.49 where"),
-                ("angle_rk4_about_middle", "equation", "look at the centrifugal term omega^2 (r - r_cm)"),
-                ("lobatto_ends_0_L", "inputs", "slices turn half their height before the ends, at h/2N and L - h/2N"),
-                ("bodies853_still_large", "piecewise", "look at the speed below which a slice rests instead of"),
-                ("strang_lone_slice_without_drag", "elsewhere", "there right without drag and without weight"),
-                ("bulirsch_slack_in_metres", "piecewise", "and at tolerances of its own"),
-                ("object_answers_along_the_tangent", "piecewise", "must know of an impact on its way"),
-                ("gauss_turns_only_forward", "mirror", "look at the sign of omega where theta is advanced"),
-                ("drag_halved", "piecewise", "counts 0.5 times: look at alpha / m, twice the damping rate"),
-                ("lists_in_pairs", "piecewise", "of an odd number of slices, in none of"),
-                ("series_cosine_grows", "angle", "right without weight"),
-                ("labradau_velocity_with_spin_sign", "elsewhere", "and at sign, unit and instant of v"),
-                ("labradau_sweeps_stop_early", "order-before-impacts", "an iteration that ends early"),
-                ("magnus_squares_e", "piecewise", "leaves as if e were 0.25 where it is 0.5"),
-                ("bulirsch_impacts_at_step_end", "piecewise", "how the time of an impact is found"),
-            )
-        ),
+            row, id=f"{row['mistake']}-{row['asked']}", marks=[pytest.mark.slow] if row["run"] == "slow" else []
+        )
+        for row in ADVICE
     ],
 )
-def test_a_check_by_itself_advises_to_look_where_the_mistake_is(mistake, check, advice):
-    solver = next(mistakes[mistake] for mistakes in LISTS.values() if mistake in mistakes).solver()
-    (result,) = certify(InProcess(solver, mistake), [check]).results
-    assert result.verdict == FAILED
-    assert advice in result.line
+def test_a_line_says_where_the_mistake_is(row):
+    """What fails first, what one check says by itself, or what ``piecewise`` says of the one throw that shows it."""
+    runner = InProcess(next(kind[row["mistake"]] for kind in LISTS.values() if row["mistake"] in kind).solver(), "x")
+    asked, _, number = row["asked"].partition(" ")
+    if asked == "throw":
+        equation = name_of(switches_of(runner.traits.equation))
+        line = " / ".join(drive(departing(runner.traits, equation, [PIECES[int(number)].ask(0)]), runner))
+    else:
+        results = certify(runner, *([[row["check"]]] if asked == "one" else []), until_failed=True).results
+        assert [result.check for result in results if result.verdict == FAILED] == [row["check"]]
+        line = results[-1].line
+    assert row["line"] in line
 
 
 @pytest.mark.parametrize("right", ["single", "expint", pytest.param("series", marks=pytest.mark.slow), "rootfinder"])
@@ -1042,33 +849,6 @@ def test_low_bounces_that_a_long_step_loses_are_no_mistake():
     exact = replace(PIECES[1], start="stacked on the cap")
     asks = [knobs.ask(0) for knobs in (*PIECES[:5], exact)]
     assert drive(departing(runner.traits, "free-flight", asks, [CROWDED.ask(0)]), runner) == ("", "")
-
-
-@pytest.mark.parametrize(
-    ("mistake", "piece", "words"),
-    [
-        ("by_angle_points_to_the_end", 0, "slices go on to half their height beyond an end"),
-        ("single_midpoint_reach_of_half_slice", 4, "slices go on to 0.25 of their height beyond an end"),
-        ("kick_drift_recoil_lifts_nothing", 4, "a slice keeps its velocity to the last digit, as if at rest"),
-        ("last_slice_forgotten", 0, "slice 3 alone is off: look at what is done to it alone"),
-        ("halving_drag_of_momentum", 0, "x the drag alpha v_CM / m besides"),
-        ("dense853_reads_past_event", 1, "m beyond an end: an answer between two steps must know of"),
-        ("flight_ends_at_half_a_second", 1, "the answer stands still there, first at t = 0.5"),
-        ("adams_not_begun_again", 1, "look at the rest of a step with an impact, and what is kept over it"),
-        ("ssp3_located_speed_before_the_step", 2, "steps without an impact have a higher order"),
-        ("adaptive_cap_rebound_put_on_base", 2, "with an impact on the cap, in none of"),
-        ("adams_pece_stale_rate", 2, "look at what the first step after an impact takes from before it"),
-        ("rest_of_step_lost", 2, "look at the clock, and at the rest of a step"),
-        ("closed_form_rest_of_the_step", 2, "steps without an impact have a higher order"),
-        ("taylor_2_last_to_let_go", 4, "look at when a slice at rest is let go"),
-    ],
-)
-def test_one_throw_tells_where_the_mistake_is(mistake, piece, words):
-    """What ``piecewise`` says of six throws, from the one of them that shows the mistake."""
-    solver = next(mistakes[mistake] for mistakes in LISTS.values() if mistake in mistakes).solver()
-    runner = InProcess(solver, mistake)
-    equation = name_of(switches_of(runner.traits.equation))
-    assert words in " / ".join(drive(departing(runner.traits, equation, [PIECES[piece].ask(0)]), runner))
 
 
 @pytest.mark.parametrize(
