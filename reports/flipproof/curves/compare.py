@@ -25,10 +25,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flipproof.curves.ensemble import first_crossing
 from flipproof.curves.events import Jumps, Matched, match, median_step
 from flipproof.curves.files import Curves
 from flipproof.curves.gap import Gap, gap
-from flipproof.curves.growth import Growth, first_crossing, fit_growth
+from flipproof.curves.growth import Growth, fit_growth
 from flipproof.frame.findings import Band, Finding, finite_or_none, observed, regression
 from slicemodel.trajectory import FloatArray
 

@@ -1,4 +1,4 @@
-"""How fast a small difference grows, and when it first exceeds a band."""
+"""How fast a small difference grows."""
 
 from __future__ import annotations
 
@@ -62,14 +62,3 @@ def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     slope = float(np.median((y[j] - y[i]) / (x[j] - x[i])))
     residual = y - slope * x
     return slope, 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
-
-
-def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:
-    """Return when ``size`` first exceeds ``band``, linear between points; None if never."""
-    above = np.flatnonzero(size > band)
-    if not len(above):
-        return None
-    if (k := int(above[0])) == 0:
-        return float(t[0])
-    share = (band - size[k - 1]) / (size[k] - size[k - 1])
-    return float(t[k - 1] + share * (t[k] - t[k - 1]))
