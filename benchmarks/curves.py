@@ -4,7 +4,7 @@
 
 Ten chaotic and ten smooth pairs a seed. Each run is held against one of another method (one pair: another engine's
 integrator), with a twin of each at a tolerance ten times as coarse; then a difference of twice the tolerance is planted
-at a random time before the horizon. The last line is a double pendulum in MuJoCo with a twin released 1e-10 aside.
+at a random time before the horizon.
 """
 
 from __future__ import annotations
@@ -157,37 +157,6 @@ def study(seed: int, say: Callable[[str], Any] = print) -> tuple[int, int, int]:
     return len(systems), alarms, missed
 
 
-def mujoco_pendulum(turn: float, end: float, label: str) -> Curves:
-    """Return a double pendulum in MuJoCo released at 2 rad times 1 + ``turn``, and 1 rad."""
-    import mujoco
-
-    link = '<geom type="capsule" fromto="0 0 0 0 0 -1" size="0.03"/>'
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><option timestep="0.002" gravity="0 0 -9.81" integrator="RK4"><flag contact="disable"/></option>'
-        f'<worldbody><body><joint type="hinge" axis="0 1 0"/>{link}<body pos="0 0 -1">'
-        f'<joint type="hinge" axis="0 1 0"/>{link}</body></body></worldbody></mujoco>'
-    )
-    data = mujoco.MjData(model)
-    data.qpos[:] = 2.0 * (1.0 + turn), 1.0
-    rows = [data.qpos.copy()]
-    for step in range(round(end / 0.002)):
-        mujoco.mj_step(model, data)
-        if step % 5 == 4:
-            rows.append(data.qpos.copy())
-    table = np.array(rows, dtype=np.float64)
-    return Curves(label, 0.01 * np.arange(len(table), dtype=np.float64), {"upper": table[:, 0], "lower": table[:, 1]})
-
-
-def last_digit() -> tuple[float, float]:
-    """Return when one unit in the last place shows 1e-3 rad, as predicted from a twin 1e-10 aside, and as seen."""
-    first, twin, last = (mujoco_pendulum(turn, 20.0, f"{turn:g}") for turn in (0.0, 1e-10, 2.2e-16))
-    predicted = [each.last_digit for each in compare(first, first, twins=[twin]).columns if each.last_digit is not None]
-    apart = compare(first, last).parted
-    return min(predicted, default=float("nan")), float("nan") if apart is None else apart
-
-
 if __name__ == "__main__":
     totals = np.sum([study(int(seed)) for seed in sys.argv[1:] or ("1",)], axis=0)
     print(f"{totals[0]} pairs, {totals[1]} false alarms; {totals[2]} of as many planted differences missed")
-    predicted, seen = last_digit()
-    print(f"one unit in the last place shows 1e-3 rad at t = {predicted:.1f} s as predicted, {seen:.1f} s as seen")

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from made_up import alive, wait_for
 
-from flipproof.bounce import exact
 from flipproof.bounce.adapter import Adapter, AdapterError
-from flipproof.bounce.passport import LINE_MEASURES, MEASURES, passport
+from flipproof.bounce.passport import MEASURES, passport
 from flipproof.bounce.specs import load
 
 
@@ -329,64 +328,6 @@ def test_thresholds_are_measured():
     for least in (0.05, 1.0):
         made = MEASURES["restitution"](Adapter("threshold", threshold(least)), 1e-3)
         assert made.numbers["threshold_m_s"] == pytest.approx(least, rel=0.02, abs=0)
-
-
-def in_line(masses, positions, velocities, restitution, dt, duration):
-    """Bodies that meet two by two, the earliest pair first; of pairs at one instant the left one."""
-    x, v, t, rows = np.array(positions, float), np.array(velocities, float), 0.0, []
-    for when in dt * np.arange(round(duration / dt) + 1):
-        while True:
-            closing, gap = v[:-1] - v[1:], np.maximum(x[1:] - x[:-1], 0)
-            waits = np.where(closing > 1e-12, gap / np.maximum(closing, 1e-300), np.inf)
-            k = int(np.argmin(waits))
-            if t + waits[k] > when:
-                break
-            x, t = x + v * waits[k], t + waits[k]
-            v[k : k + 2] = exact.line_velocities(masses[k : k + 2], v[k : k + 2], restitution)
-        x, t = x + v * (when - t), when
-        rows.append((x.copy(), v.copy()))
-    return dt * np.arange(len(rows)), *map(np.array, zip(*rows, strict=True))
-
-
-def test_bodies_in_line():
-    for name in ("pairs", "three in line"):
-        assert LINE_MEASURES[name](Adapter("line", located, in_line), 1e-3).remark == ""
-
-    def without_masses(masses, *asked):
-        return in_line([1.0] * len(masses), *asked)
-
-    def together(masses, positions, velocities, restitution, dt, duration):
-        t, x, v = in_line(masses, positions, velocities, restitution, dt, duration)
-        return t, x, np.where(t[:, None] > 0.06, v.mean(1, keepdims=True), v) if len(masses) == 3 else v
-
-    def leaning(masses, positions, velocities, restitution, dt, duration):
-        t, x, v = in_line(masses, positions, velocities, restitution, dt, duration)
-        return t, x, v + 1e-3 * (t[:, None] > 0.06) * (velocities[-1] < 0)
-
-    def immovable(masses, *asked):
-        return in_line([1e9 if m == 1000 else m for m in masses], *asked)
-
-    def apart(masses, positions, velocities, *asked):
-        touching = len(masses) == 2 and positions[0] == positions[1]
-        return in_line(masses, positions, [0.0, 0.0] if touching else velocities, *asked)
-
-    def from_the_left(masses, positions, velocities, *asked):
-        return in_line(masses, positions, [u * (u > 0) for u in velocities], *asked)
-
-    def once_a_step(masses, positions, *asked):
-        near = len(masses) == 3 and 1e-5 < positions[2] - positions[1] < 1e-2
-        return in_line(masses, positions, [0.0, 0.0, 0.0] if near else asked[0], *asked[1:])
-
-    for line, name, words in (
-        (once_a_step, "three in line", "a cradle of three ends with 0.000, 0.000, 0.000 m/s, not 0, 0, 1"),
-        (without_masses, "pairs", "masses 1 : 1000, e = 1)"),
-        (immovable, "pairs", "off by 0.002 m/s"),
-        (apart, "pairs", "touching at t = 0"),
-        (from_the_left, "pairs", "hit from the right"),
-        (together, "three in line", "ends with 0.333, 0.333, 0.333 m/s, not 0, 0, 1"),
-        (leaning, "one instant", "differ by 0.002 m/s"),
-    ):
-        assert words in LINE_MEASURES[name](Adapter("line", located, line), 1e-3).remark
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "mujoco"])

@@ -25,10 +25,8 @@ def growing(size, rate=2.0):
     return of(np.sin(T) + size * np.exp(rate * T))
 
 
-def test_growth_and_horizon_of_a_known_law():
+def test_the_horizon_of_a_known_law():
     found = compare(of(np.sin(T)), of(np.sin(T)), twins=[growing(1e-9)], tolerance=1e-3)
-    (column,) = found.columns
-    assert column.growth.rate == pytest.approx(2.0, abs=0.05)
     # The band, twice the change, is half the tolerance.
     assert found.horizon == pytest.approx(np.log(1e-3 / 4 / 1e-9) / 2, abs=0.02)
     assert found.passed
@@ -251,9 +249,6 @@ def test_each_column_has_its_own_horizon_in_words():
     lines = compare(base, base, twins=[twin]).lines
     assert any(line.startswith("x: from t = 5.53") for line in lines)
     assert not any(line.startswith("y: from t =") for line in lines)
-    assert any("grows at 1 per unit of time" in line for line in lines)
-    linear = compare(base, base, twins=[of(np.sin(T) + 1e-6 * T, y=np.cos(T))]).lines
-    assert any("x: largest difference 0 at t = 0; the twins' change does not grow exponentially" in s for s in linear)
 
 
 def test_numbers_and_times_have_the_digits_that_tell_them_apart():
@@ -312,12 +307,6 @@ def test_foreign_pairs_raise_no_false_alarm_and_hide_no_difference(seed, monkeyp
     short = [pair for k, pair in enumerate(benchmark.pairs(seed)) if k in (0, 3, 10, 18)]
     monkeypatch.setattr(benchmark, "pairs", lambda _: short)
     assert benchmark.study(seed, say=lambda _: None) == (4, 0, 0)
-
-
-def test_a_twin_predicts_when_the_last_digit_shows():
-    pytest.importorskip("mujoco")
-    predicted, seen = benchmark.last_digit()
-    assert predicted == pytest.approx(seen, rel=0.1, abs=0.0)
 
 
 def written(path, columns):

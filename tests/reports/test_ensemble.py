@@ -1,4 +1,4 @@
-"""Ensembles whose width is known, and the growth of differences whose law is known."""
+"""Ensembles whose width is known."""
 
 import math
 
@@ -7,7 +7,6 @@ import pytest
 from made_up import trajectory_of
 
 from flipproof.curves.ensemble import Ensemble, difference
-from flipproof.curves.growth import fit_growth
 from slicemodel import Scenario, Trajectory
 
 T = np.linspace(0.0, 0.5, 1001)
@@ -58,32 +57,3 @@ def test_a_difference_is_taken_at_the_times_of_the_first_that_both_have():
     t, signed = difference(flight(0.0), flight(-other, t=other))
     assert t[-1] == pytest.approx(0.3)
     assert signed == pytest.approx(-t)
-
-
-@pytest.mark.parametrize("rate", [-20.0, 3.0, 40.0])
-def test_an_exponential_has_its_rate(rate):
-    growth = fit_growth(T, 1e-6 * np.exp(rate * T))
-    assert growth.rate == pytest.approx(rate, rel=1e-6, abs=0.0)
-    assert growth.error < 1e-6
-
-
-def test_sign_changes_and_single_jumps_do_not_spoil_the_rate():
-    size = 1e-6 * np.exp(30 * T) * np.cos(400 * T)
-    size[700] = 1e6
-    size[5] = math.nan
-    growth = fit_growth(T, size)
-    assert growth.rate == pytest.approx(30, abs=3 * growth.error)
-    assert 0 < growth.error < 3
-
-
-def test_noise_rarely_has_a_clear_rate_and_its_error_is_honest():
-    fits = [fit_growth(T, np.random.default_rng(seed).normal(size=len(T))) for seed in range(200)]
-    assert sum(fit.clear for fit in fits) <= 20
-    assert sum(abs(fit.rate) <= 2 * fit.error for fit in fits) >= 160
-
-
-@pytest.mark.parametrize("size", [np.zeros(1001), np.full(1001, math.nan), np.full(1001, 1e-16)])
-def test_nothing_above_round_off_has_no_rate(size):
-    growth = fit_growth(T, size)
-    assert math.isnan(growth.rate)
-    assert not growth.clear

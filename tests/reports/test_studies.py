@@ -22,8 +22,7 @@ from flipproof.chapters.step_size.chapter import (
     plan_step_size,
     study_step_size,
 )
-from flipproof.curves.ensemble import largest_change
-from flipproof.curves.growth import first_crossing
+from flipproof.curves.ensemble import first_crossing, largest_change
 from flipproof.curves.order import observed_order
 from flipproof.frame.findings import Band, Finding
 from flipproof.frame.flights import Flights, Outcome

@@ -1,16 +1,12 @@
-"""What an engine's author writes: a function that drops a body and, if the engine lets bodies meet, a second.
+"""What an engine's author writes: a function that drops a body on a floor.
 
     def drop(height, speed, restitution, gravity, dt, duration):
         ...                     # y = height above the floor [m], speed upward [m/s], gravity downward [m/s^2]
         return t, y, v          # at the engine's own steps, from release to duration
 
-    def line(masses, positions, velocities, restitution, dt, duration):
-        ...                     # bodies on a line, without gravity; two of them touch where their positions are equal
-        return t, x, v          # x and v of shape (P, bodies)
-
 An adapter is named as a solver is: file.py:name, package.module:name, or cmd:'program {height} {speed} {restitution}
 {gravity} {dt} {duration}', which prints the columns t,y,v as CSV. The name stands for ``drop`` itself, or for a module,
-class or object that has it, optionally with ``line`` and ``settings``, a mapping to be printed.
+class or object that has it, optionally with ``settings``, a mapping to be printed.
 """
 
 from __future__ import annotations
@@ -56,7 +52,6 @@ class Adapter:
 
     name: str
     ask_drop: Callable[..., Any]
-    ask_line: Callable[..., Any] | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def drop(
@@ -70,46 +65,19 @@ class Adapter:
             If the adapter raises anything, or returns no flight of that duration.
         """
         arguments = map(float, (height, speed, restitution, gravity, dt, duration))
-        answer = _answer(self.ask_drop, dict(zip(PARAMETERS, arguments, strict=True)))
-        t, y, v = _arrays(answer, ("t", "y", "v"))
+        t, y, v = _arrays(_answer(self.ask_drop, dict(zip(PARAMETERS, arguments, strict=True))))
         _check_times(t, dt, duration)
         return t, y, v
 
-    def line(
-        self,
-        masses: Sequence[float],
-        positions: Sequence[float],
-        velocities: Sequence[float],
-        restitution: float,
-        dt: float,
-        duration: float,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return t, shape (P,), x and v, shape (P, bodies), of bodies on a line."""
-        assert self.ask_line is not None
-        arguments = {
-            "masses": masses,
-            "positions": positions,
-            "velocities": velocities,
-            "restitution": restitution,
-            "dt": dt,
-            "duration": duration,
-        }
-        t, x, v = _arrays(_answer(self.ask_line, arguments), ("t", "x", "v"), len(masses))
-        _check_times(t, dt, duration)
-        return t, x, v
 
-
-def _answer(call: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
+def _answer(call: Callable[..., Any], arguments: Mapping[str, float]) -> Any:
     """Return what an adapter answers; what it raises becomes an AdapterError with the question and the place."""
     try:
         return call(*arguments.values())
     except AdapterError:
         raise
     except Exception as error:  # of somebody else's code
-        question = ", ".join(
-            f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value}"
-            for name, value in arguments.items()
-        )
+        question = ", ".join(f"{name}={value:.6g}" for name, value in arguments.items())
         place = traceback.extract_tb(error.__traceback__)[-1]
         message = shortened(f"{type(error).__name__}: {error}", 200)
         raise AdapterError(
@@ -117,17 +85,16 @@ def _answer(call: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
         ) from error
 
 
-def _arrays(answer: Any, names: Sequence[str], *bodies: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the times, shape (P,), and two arrays of shape (P, *bodies), all finite."""
+def _arrays(answer: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return t, y and v, all finite and of one length."""
     if not isinstance(answer, Sequence) or len(answer) != 3:
-        raise AdapterError(f"the answer is no triple of {', '.join(names)}")
+        raise AdapterError("the answer is no triple of t, y, v")
     try:
         rows = np.size(answer[0])
-        t = numbers_of(names[0], answer[0], (rows,))
-        first, second = (numbers_of(names[k], answer[k], (rows, *bodies)) for k in (1, 2))
+        t, y, v = (numbers_of(name, column, (rows,)) for name, column in zip("tyv", answer, strict=True))
     except ValueError as error:
         raise AdapterError(str(error)) from None
-    return t, first, second
+    return t, y, v
 
 
 def _check_times(t: FloatArray, dt: float, duration: float) -> None:

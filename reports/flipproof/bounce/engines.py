@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -44,50 +44,22 @@ def _pymunk() -> Adapter:
         space.gravity, space.iterations, space.collision_slop = (0.0, -gravity), 60, 0.0
         return space
 
-    def ball(space: Any, mass: float, position: tuple[float, float], velocity: tuple[float, float], e: float) -> Any:
-        body = pymunk.Body(mass, math.inf)
-        shape = pymunk.Circle(body, RADIUS)
-        shape.elasticity, shape.friction = e, 0.0
-        body.position, body.velocity = position, velocity
-        space.add(body, shape)
-        return body
-
     def drop(height: float, speed: float, restitution: float, gravity: float, dt: float, duration: float) -> Answer:
         space = space_of(gravity)
         floor = pymunk.Poly(space.static_body, [(-50, -50), (50, -50), (50, 0), (-50, 0)])
         floor.elasticity, floor.friction = 1.0, 0.0  # the engine multiplies the two
-        space.add(floor)
-        body = ball(space, 1.0, (0.0, height + RADIUS), (0.0, speed), restitution)
+        body = pymunk.Body(1.0, math.inf)
+        ball = pymunk.Circle(body, RADIUS)
+        ball.elasticity, ball.friction = restitution, 0.0
+        body.position, body.velocity = (0.0, height + RADIUS), (0.0, speed)
+        space.add(floor, body, ball)
         return _trajectory(
             round(duration / dt), dt, lambda: (body.position.y - RADIUS, body.velocity.y), lambda: space.step(dt)
         )
 
-    def line(
-        masses: Sequence[float],
-        positions: Sequence[float],
-        velocities: Sequence[float],
-        restitution: float,
-        dt: float,
-        duration: float,
-    ) -> Answer:
-        space = space_of(0.0)
-        bodies = [
-            ball(space, m, (x + 2 * RADIUS * k, 0.0), (u, 0.0), math.sqrt(restitution))
-            for k, (m, x, u) in enumerate(zip(masses, positions, velocities, strict=True))
-        ]
-        return _trajectory(
-            round(duration / dt),
-            dt,
-            lambda: (
-                [body.position.x - 2 * RADIUS * k for k, body in enumerate(bodies)],
-                [body.velocity.x for body in bodies],
-            ),
-            lambda: space.step(dt),
-        )
-
     space = space_of(9.81)
     settings = {name: getattr(space, name) for name in ("iterations", "collision_slop", "collision_bias")}
-    return Adapter("pymunk", drop, line, {"version": pymunk.version, **settings})
+    return Adapter("pymunk", drop, {"version": pymunk.version, **settings})
 
 
 def _box2d() -> Adapter:
@@ -123,7 +95,7 @@ def _box2d() -> Adapter:
         if hasattr(Box2D, "b2_velocityThreshold")
         else "1 (compiled)",
     }
-    return Adapter("box2d", drop, None, settings)
+    return Adapter("box2d", drop, settings)
 
 
 def _mujoco() -> Adapter:
@@ -156,4 +128,4 @@ def _mujoco() -> Adapter:
         "solref": f"-{stiffness:g} and the damping that a linear spring needs for e",
         "solimp": "0.99 0.99 0.001",
     }
-    return Adapter("mujoco", drop, None, settings)
+    return Adapter("mujoco", drop, settings)

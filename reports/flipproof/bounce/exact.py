@@ -1,9 +1,8 @@
-"""Exact answers: a body under gravity over a floor, and bodies on a line that meet."""
+"""The exact answer: a body under gravity over a floor."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -43,10 +42,3 @@ def _time_to_floor(h: float, u: float, gravity: float) -> float:
 def rest_time(height: float, restitution: float, gravity: float) -> float:
     """Return when a body dropped at rest has made its last impact: sqrt(2 h / g) (1 + e) / (1 - e) [s]."""
     return math.sqrt(2 * height / gravity) * (1 + restitution) / (1 - restitution)
-
-
-def line_velocities(masses: Sequence[float], velocities: Sequence[float], restitution: float) -> FloatArray:
-    """Return the velocities of two bodies after they meet [m/s], from momentum and e alone."""
-    (m, n), (u, w) = masses, velocities
-    common = (m * u + n * w) / (m + n)
-    return np.array([common - n * restitution * (u - w) / (m + n), common + m * restitution * (u - w) / (m + n)])

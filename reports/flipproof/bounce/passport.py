@@ -98,14 +98,13 @@ def passport(adapter: Adapter, dt: float = 1e-3, progress: Callable[..., None] =
     """
     if not 1e-5 <= dt <= 1e-2:
         raise ValueError(f"dt = {dt!r} s is outside [1e-05, 0.01]")
-    measures = MEASURES if adapter.ask_line is None else MEASURES | LINE_MEASURES
     measurements = []
-    for name, measure in measures.items():
+    for name, measure in MEASURES.items():
         try:
             measurements.append(measure(adapter, dt))
         except AdapterError as error:
             raise AdapterError(f"{adapter.name}: {name}: {error}") from None
-        progress(len(measurements), len(measures), name)
+        progress(len(measurements), len(MEASURES), name)
     return Passport(adapter.name, adapter.settings, dt, tuple(measurements))
 
 
@@ -458,51 +457,6 @@ def precision(adapter: Adapter, dt: float) -> Measurement:
     return Measurement("precision", f"speeds are numbers of float{bits}", remark, {"bits": bits})
 
 
-def pairs(adapter: Adapter, dt: float) -> Measurement:
-    """Two bodies of 1 : 1000 and 1 : 1, elastic and not, hit from the right, touching at t = 0: momentum and e."""
-    worst, case = 0.0, ""
-    gap, left, right = 0.05 + 0.3 * dt, (1.0, 0.0), (0.0, -1.0)
-    cases = [
-        (masses, e, left, gap, "") for masses in ((1.0, 1.0), (1.0, 1000.0), (1000.0, 1.0)) for e in (0.0, 0.5, 1.0)
-    ]
-    equal = (1.0, 1.0)
-    cases += [(equal, 1.0, right, gap, ", hit from the right"), (equal, 1.0, left, 0.0, ", touching at t = 0")]
-    for masses, e, velocities, distance, text in cases:
-        _, _, v = adapter.line(masses, (0.0, distance), velocities, e, dt, 0.12)
-        error = float(np.abs(v[-1] - exact.line_velocities(masses, velocities, e)).max())
-        if error > worst:
-            worst, case = error, f"masses {masses[0]:g} : {masses[1]:g}, e = {e:g}{text}"
-    remark = "" if worst <= REMARKED_ERROR else f"velocities after a pair's impact are off by {worst:.2g} m/s ({case})"
-    return Measurement(
-        "pairs", f"velocities after a pair's impact at 1 m/s are off by {worst:.1e} m/s at most", remark,
-        {"largest_difference_m_s": worst},
-    )  # fmt: skip
-
-
-def three_in_line(adapter: Adapter, dt: float) -> Measurement:
-    """Three equal bodies, two of them 1/1000 or 0.4 of a step's travel apart: only the last flies on: a cradle."""
-    for first, second in ((0.3, 0.7), (0.0, 1e-3)):
-        places = (0.0, 0.05 + first * dt, 0.05 + second * dt)
-        _, _, v = adapter.line((1.0, 1.0, 1.0), places, (1.0, 0.0, 0.0), 1.0, dt, 0.12)
-        error = float(np.abs(v[-1] - (0.0, 0.0, 1.0)).max())
-        text = ", ".join(f"{u:.3f}" for u in v[-1])
-        if not error <= REMARKED_ERROR:
-            break
-    remark = "" if error <= REMARKED_ERROR else f"a cradle of three ends with {text} m/s, not 0, 0, 1"
-    return Measurement("three in line", f"a cradle of three ends with {text} m/s", remark, {"velocities": list(v[-1])})
-
-
-def one_instant(adapter: Adapter, dt: float) -> Measurement:
-    """Two bodies strike a third from both sides at one instant; the answer is its own mirror image."""
-    _, _, v = adapter.line((1.0, 1.0, 1.0), (-0.05, 0.0, 0.05), (1.0, 0.0, -1.0), 1.0, dt, 0.12)
-    asymmetry = float(np.abs(v[-1] + v[-1][::-1]).max())
-    remark = "" if asymmetry <= 1e-6 else f"after two hits at one instant mirrored speeds differ by {asymmetry:.2g} m/s"
-    return Measurement(
-        "one instant", f"two hits at one instant are mirror images of each other to {asymmetry:.1e} m/s", remark,
-        {"asymmetry_m_s": asymmetry},
-    )  # fmt: skip
-
-
 Measure = Callable[[Adapter, float], Measurement]
 
 MEASURES: Final[dict[str, Measure]] = {
@@ -517,6 +471,3 @@ MEASURES: Final[dict[str, Measure]] = {
     "precision": precision,
 }
 """What is measured of every engine."""
-
-LINE_MEASURES: Final[dict[str, Measure]] = {"pairs": pairs, "three in line": three_in_line, "one instant": one_instant}
-"""What is also measured of an adapter with ``line``."""

@@ -33,7 +33,7 @@ def load(spec: str) -> Adapter:
         return engines.adapter(spec)
     if spec.startswith("cmd:"):
         settings: dict[str, str] = {}
-        return Adapter(spec, _command(shlex.split(spec.removeprefix("cmd:")), settings), None, settings)
+        return Adapter(spec, _command(shlex.split(spec.removeprefix("cmd:")), settings), settings)
     if ":" not in spec:
         raise AdapterError(
             unknown_name("adapter", spec, BUILT_IN) + "; or file.py:name, package.module:name, cmd:'...'"
@@ -49,7 +49,7 @@ def load(spec: str) -> Adapter:
     drop = getattr(target, "drop", target)
     if not callable(drop):
         raise AdapterError(f"{spec} is no function and has no method drop")
-    return Adapter(spec, drop, getattr(target, "line", None), dict(getattr(target, "settings", {})))
+    return Adapter(spec, drop, dict(getattr(target, "settings", {})))
 
 
 def _command(argv: list[str], settings: dict[str, str]) -> Drop:

@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 from flipproof.curves.events import Jumps, Matched, match, median_step
 from flipproof.curves.files import Curves
 from flipproof.curves.gap import Gap, gap
-from flipproof.curves.growth import Growth, first_crossing, fit_growth
 from flipproof.frame.findings import Band, Finding, finite_or_none, observed, regression
 from slicemodel.trajectory import FloatArray
 
@@ -51,8 +50,6 @@ class Column:
     band : (K,) - of the difference, from twins; zero without any
     known : (K,) - where the band is at most half the tolerance
     tolerance : in the unit of the column; 0 where the twins alone decide, inf where nothing is claimed
-    growth : of the twins' change, up to where it exceeds the tolerance
-    last_digit : when a change of the first row by one unit in the last place exceeds the tolerance; None: not known
     unit : of the values, if it is known
     """
 
@@ -61,8 +58,6 @@ class Column:
     band: FloatArray
     known: NDArray[np.bool_]
     tolerance: float
-    growth: Growth
-    last_digit: float | None
     unit: str = ""
 
     @cached_property
@@ -198,14 +193,7 @@ class Comparison:
             text = f"{column.name}: largest difference {size} at t = {gap.t[k]:.{digits}g}"
             if gap.interpolated:
                 text += f" ({gap.interpolated} of {len(gap.t)} times interpolated, {column.comparable.sum()} compared)"
-            if column.band.any():
-                text += f"; the twins' change {_growth_text(column.growth)}"
             lines.append(text)
-            if column.last_digit is not None:
-                lines.append(
-                    f"{column.name}: in exact arithmetic a change by one unit in the last place would show "
-                    f"{column.tolerance:g} at about t = {column.last_digit:.2g}; a solver's own rounding may be faster"
-                )
             if column.horizon is not None:
                 at = f"at {column.tolerance:g}"
                 lines.append(
@@ -242,9 +230,6 @@ class Comparison:
                     "unit": column.unit,
                     "tolerance": finite_or_none(column.tolerance),
                     "horizon": column.horizon,
-                    "growth_rate": finite_or_none(column.growth.rate),
-                    "growth_error": finite_or_none(column.growth.error),
-                    "last_digit_shows_at": column.last_digit,
                     "times": len(column.gap.t),
                     "compared": int(column.comparable.sum()),
                     "interpolated": column.gap.interpolated,
@@ -353,26 +338,7 @@ def _column(
     change = sum((_largest_change(gaps, difference.t) for gaps in changes), np.zeros(len(difference.t)))
     band = SAFETY * np.maximum.accumulate(change)
     known = np.ones(len(band), bool) if not tolerance else band <= 0.5 * tolerance
-    nonzero = np.flatnonzero(change > 0.0)
-    crossing = first_crossing(difference.t, np.where(np.isfinite(change), change, np.finfo(float).max), min_jump)
-    stop = math.inf if crossing is None else crossing
-    growth = fit_growth(difference.t, change, stop=stop) if len(nonzero) else Growth()
-    last_digit = None
-    if len(changes[0]) == 1 and crossing is not None and growth.rate > 0.0 and growth.clear and not growth.power:
-        initial = changes[0][0].size[0]
-        value = abs(float(first.columns[name][0]))
-        ulp = float(np.spacing(value))
-        if value > 0.0 and ulp < initial < min_jump:
-            last_digit = crossing + (math.log(initial) - math.log(ulp)) / growth.rate
-    return Column(
-        name=name,
-        gap=difference,
-        band=band,
-        known=known,
-        tolerance=tolerance,
-        growth=growth,
-        last_digit=last_digit,
-    )
+    return Column(name=name, gap=difference, band=band, known=known, tolerance=tolerance)
 
 
 def _largest_change(gaps: Sequence[Gap], t: FloatArray) -> FloatArray:
@@ -403,15 +369,6 @@ def _apart(value: float, allowed: float) -> str:
     """Return a difference and what is admissible, in as many digits as tell them apart."""
     digits = next((k for k in range(3, 17) if f"{value:.{k}g}" != f"{allowed:.{k}g}"), 17)
     return f"{value:.{digits}g} {'≤' if value <= allowed else '>'} {allowed:.{digits}g}"
-
-
-def _growth_text(growth: Growth) -> str:
-    if not math.isfinite(growth.rate):
-        return "has too few points above round-off for a rate of growth"
-    if growth.power or not growth.clear:
-        return "does not grow exponentially"
-    way = "grows" if growth.rate > 0.0 else "shrinks"
-    return f"{way} at {abs(growth.rate):.3g} per unit of time (standard error {growth.error:.2g})"
 
 
 def _slug(name: str) -> str:

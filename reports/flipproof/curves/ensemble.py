@@ -13,7 +13,6 @@ from typing import Self
 
 import numpy as np
 
-from flipproof.curves.growth import first_crossing
 from flipproof.frame.findings import Finding, regression
 from flipproof.frame.solvers import Missing
 from slicemodel import Trajectory
@@ -73,6 +72,17 @@ class Ensemble:
     def horizon(self) -> float | None:
         """First time at which the width exceeds the band [s]; None: never."""
         return first_crossing(self.t, self.width, self.band)
+
+
+def first_crossing(t: FloatArray, size: FloatArray, band: float) -> float | None:
+    """Return when ``size`` first exceeds ``band``, linear between points; None if never."""
+    above = np.flatnonzero(size > band)
+    if not len(above):
+        return None
+    if (k := int(above[0])) == 0:
+        return float(t[0])
+    share = (band - size[k - 1]) / (size[k] - size[k - 1])
+    return float(t[k - 1] + share * (t[k] - t[k - 1]))
 
 
 def difference(first: Trajectory, second: Trajectory) -> tuple[FloatArray, FloatArray]:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipproof.curves.ensemble import difference
-from flipproof.curves.growth import first_crossing
+from flipproof.curves.ensemble import difference, first_crossing
 from slicemodel import Impact, Trajectory
 from slicemodel.trajectory import FloatArray
 
