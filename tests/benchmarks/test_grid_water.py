@@ -142,13 +142,15 @@ def test_suction_holds_water_together_for_a_while():
     assert late[1] > 1.3 * late[0]
 
 
+@pytest.mark.slow
 def test_finer_cells_move_the_plateau_little():
     levels = [plateau(run) for run in (coarse(0.5), grid_water.solve(throw(0.5), cells=12))]
     assert abs(levels[1] - levels[0]) < 0.06
     assert all(0.15 < level < 0.3 for level in levels)
 
 
-@pytest.mark.parametrize("filling", [pytest.param(0.5, marks=pytest.mark.slow), 0.75])
+@pytest.mark.slow
+@pytest.mark.parametrize("filling", [0.5, 0.75])
 def test_particles_that_share_nothing_with_it_turn_the_bottle_alike(filling):
     run = fly(throw(filling), 0.008, "spinning")
     assert run.drift < 1e-12

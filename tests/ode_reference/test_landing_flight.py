@@ -26,6 +26,7 @@ def test_it_ends_where_the_rods_touch():
     np.testing.assert_allclose(one.r, other.r, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_rods_that_meet_in_strong_drag_touch_where_the_rods_do():
     throw = replace(THROW, drag=10.0)
     one = ode_reference.fly(throw, TABLE, dt=5e-5)

@@ -46,7 +46,7 @@ SAYS = {
 NOT_OF_ICE = {"differences", "frozen", "overlap", "step-size", "waterfall"}
 """Figures that have nothing to show if nothing moves."""
 
-LONG = ("short", "weightless, other spin", "elastic", "full")
+LONG = ("one slice", "short", "weightless, other spin", "elastic", "full")
 """What is thrown alone only among the long forms; of the last three, all together is thrown on every push."""
 
 

@@ -643,7 +643,7 @@ def test_films_of_one_bottle_share_drag_and_restitution(bottles):
     assert high - low < min(np.subtract(*shortest(one.estimate.draws["gamma"], 0.999)[::-1]) for one in judged)
 
 
-@pytest.mark.parametrize("seeds", [(0, 1), pytest.param((2, 3), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [(0,), pytest.param((1, 2, 3), marks=pytest.mark.slow)])
 def test_a_spoiled_film_is_estimated_or_refused(seeds):
     """Cells of a film changed at random: an estimate, or one line; benchmarks/films.py does it 700 times."""
     for seed in seeds:

@@ -525,7 +525,7 @@ def judged(kind, knobs):
     ("name", "words"),
     [
         pytest.param("frozen_grid", {"slices": 2, "restitution": 0.0, "damping": 0.0}, marks=pytest.mark.slow),
-        ("euler_located", {"slices": 17}),
+        pytest.param("euler_located", {"slices": 17}, marks=pytest.mark.slow),
     ],
 )
 def test_errors_that_fall_by_leaps_are_confirmed_at_finer_steps(name, words):
@@ -538,6 +538,7 @@ def test_errors_that_fall_by_leaps_are_confirmed_at_finer_steps(name, words):
     assert not drive(confirmed(solver.traits, knobs, found, SEED, "eq8", 0.01), solver).wrong
 
 
+@pytest.mark.slow
 def test_a_step_that_is_capped_hides_its_error_and_is_not_accused_of_it():
     solver, found = judged(CappedEuler, WHOLE)
     assert found.own_error == 0.0  # all coarse levels take the same steps
@@ -836,13 +837,16 @@ def test_a_line_says_where_the_mistake_is(row):
     assert row["line"] in line
 
 
-@pytest.mark.parametrize("right", ["single", "expint", pytest.param("series", marks=pytest.mark.slow), "rootfinder"])
+@pytest.mark.parametrize(
+    "right", ["single", "rootfinder", *(pytest.param(name, marks=pytest.mark.slow) for name in ("expint", "series"))]
+)
 def test_slow_impacts_of_right_solvers_rebound(right):
     """The first counts in single precision, in which the lowest rebounds are lost to rounding."""
     (result,) = certify(InProcess(LISTS["right"][right].solver(), right), ["restitution"]).results
     assert result.verdict == PASSED
 
 
+@pytest.mark.slow
 def test_low_bounces_that_a_long_step_loses_are_no_mistake():
     """Beside throws on whose impacts it is exact, a right solver departs at four low bounces of one."""
     runner = InProcess(LISTS["right"]["rootfinder"].solver(), "rootfinder")
