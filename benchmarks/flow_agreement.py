@@ -56,8 +56,8 @@ class Case:
 
 def random_case(rng: np.random.Generator, most_slices: int = 100) -> Case:
     """Return a throw with 2 to ``most_slices`` slices."""
-    names = [*ode_reference.LADDER, *(switches.name for switches in ode_reference.Switches.every())]
-    model = str(rng.choice(names[:7])) if rng.random() < 0.6 else str(rng.choice(names[7:]))
+    every = [switches.name for switches in ode_reference.Switches.every()]
+    model = str(rng.choice(ode_reference.LADDER if rng.random() < 0.6 else every))
     bottle = Bottle()
     if rng.random() < 0.5:
         length = float(rng.uniform(0.15, 0.4))

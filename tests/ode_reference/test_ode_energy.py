@@ -59,15 +59,15 @@ def test_the_witness_keeps_the_same_books(model):
 def test_what_the_ladder_mends_is_what_the_ledger_no_longer_books():
     scenario = Scenario(duration=0.3).with_slices(20)
     wrong = {"weight", "negative_spring", "missing_origin", "missing_recoil"}
-    booked = [
-        {work for work in wrong if solve(scenario, model, energy=True).diagnostics["energy"][work] != 0.0}
+    booked = {
+        model: {work for work in wrong if solve(scenario, model, energy=True).diagnostics["energy"][work] != 0.0}
         for model in LADDER
-    ]
-    assert booked[0] == booked[1] == wrong
-    assert booked[2] == booked[3] == wrong - {"negative_spring"}
-    assert booked[4] == {"missing_origin", "missing_recoil"}
-    assert booked[5] == {"missing_recoil"}
-    assert booked[6] == set()
+    }
+    assert booked["published-limit"] == booked["signs-limit"] == wrong
+    assert booked["eq8-wall"] == booked["eq8"] == wrong - {"negative_spring"}
+    assert booked["eq8-weightless"] == {"missing_origin", "missing_recoil"}
+    assert booked["accelerating-origin"] == {"missing_recoil"}
+    assert booked["free-flight"] == set()
 
 
 def test_drag_takes_alpha_times_the_square_of_every_speed_along_the_wall():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flipproof.frame.columns import columns_csv, curves_csv, rows_csv
-from flipproof.frame.findings import Band, Finding, regression
+from flipproof.frame.findings import RULES, Band, Finding, regression
 from flipproof.frame.gather import ChapterResult
 from flipproof.output.junit import junit_text
 from flipproof.output.summary import SUMMARY_VERSION, json_ready, schema_text, summarise, summary_text
@@ -38,6 +38,10 @@ def test_the_schema_is_a_schema_and_names_its_version():
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert SCHEMA["properties"]["version"]["const"] == SUMMARY_VERSION
+
+
+def test_the_schema_names_every_rule_of_a_band():
+    assert SCHEMA["$defs"]["finding"]["properties"]["band_rule"]["enum"] == [*RULES, None]
     assert SCHEMA["$id"].endswith(f":{SUMMARY_VERSION}")
 
 
