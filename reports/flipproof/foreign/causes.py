@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from itertools import combinations
 from typing import Final
@@ -48,7 +48,7 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
             _place_cause(intervals)
             or _inertia_cause(throws[0])
             or _advance_cause(throws[0])
-            or next(filter(None, (_motion_cause(some, seldom=seldom) for some in (intervals, *throws))), "")
+            or _motion_cause((intervals, *throws), seldom=seldom)
             or _slice_cause(intervals)
             or (STALE_OMEGA if np.median([i.departure["omega"] for i in intervals]) > OFF_MOMENTUM else "")
         )
@@ -331,20 +331,41 @@ DRAG_OF_EQ8: Final = "the drag, alpha (v - v_CM) / m"
 DRAG_OF_FREE_FLIGHT: Final = "the drag, alpha v / m + alpha sum(v) / M_c"
 """Terms that are all of an equation's drag."""
 
+WHOLE_DRAGS: Final = ((DRAG_OF_EQ8,), (DRAG_OF_FREE_FLIGHT,))
+
+EXPLAINED: Final = 0.03
+"""Share of an acceleration that may remain beside terms that explain it."""
+
+REACTION: Final = "the drag's reaction on the tube, alpha sum(v) / M_c"
+MEAN_DRAG: Final = "the drag alpha mean(v) / m"
+
 WEIGHT_OF_ITS_OWN: Final = "cos(theta), in m/s^2,"
 """Term of a throw without gravity."""
 
 
-def _motion_cause(intervals: Sequence[Interval], *, seldom: bool) -> str:
-    """Return the extra terms in the acceleration of flying slices, if one to three explain it.
+def _motion_cause(samples: Sequence[Sequence[Interval]], *, seldom: bool) -> str:
+    """Return the extra terms in the acceleration of flying slices, if one to three explain it in one of the samples.
 
-    A drag that ``seldom`` counts otherwise has the right coefficient.
+    Fewer terms come first: a factor that depends on the throw is one term of one throw, and several of all of them. A
+    drag that ``seldom`` counts otherwise has the right coefficient.
     """
-    if (field := _only_field(intervals)) not in ("", "v"):
+    if (field := _only_field(samples[0])) not in ("", "v"):
         return f"{field} alone is off"
+    fits = [(intervals, *fit) for intervals in samples if (fit := _terms_of(intervals)) is not None]
+    for count, rest in ((1, EXPLAINED), (1, 0.1), (2, EXPLAINED), (3, EXPLAINED)):
+        for intervals, table, target in fits:
+            if explained := _explained(table, target, count, rest):
+                throw = intervals[0].throw
+                where = f" where N = {throw.n_slices}" if len(intervals) < len(samples[0]) else ""
+                return _motion_words(throw, *explained, where, seldom=seldom)
+    return ""
+
+
+def _terms_of(intervals: Sequence[Interval]) -> tuple[dict[str, FloatArray], FloatArray] | None:
+    """Return the terms that an acceleration may have, and the extra one of flying slices; None if too few fly."""
     flying = _undisturbed(intervals)
     if len(flying) < 6:
-        return ""
+        return None
     rows: dict[str, list[FloatArray]] = {}
     extra = []
     for i in flying:
@@ -353,9 +374,9 @@ def _motion_cause(intervals: Sequence[Interval], *, seldom: bool) -> str:
         r, v = i.r.mean(axis=0), i.v.mean(axis=0)
         theta, omega = float(i.theta.mean()), float(i.omega.mean())
         ones = np.ones(int(free.sum()))
-        drag, n = throw.drag / throw.slice_mass, throw.n_slices
+        drag = throw.drag / throw.slice_mass
         centre = float(centre_of_mass(throw, r[None])[0])
-        share = throw.slice_mass * n / throw.total_mass
+        reaction = throw.drag * v[free].sum() / (throw.bottle.mass + throw.slice_mass * np.sum(~free)) * ones
         terms = {
             "omega^2 (r - r_CM)": omega**2 * (r[free] - centre),
             "omega^2 (r - L/2)": omega**2 * (r[free] - throw.bottle.length / 2),
@@ -364,12 +385,12 @@ def _motion_cause(intervals: Sequence[Interval], *, seldom: bool) -> str:
             "g cos(theta)": throw.gravity * np.cos(theta) * ones,
             "g sin(theta)": throw.gravity * np.sin(theta) * ones,
             "g cos(theta_0 + omega_0 t)": throw.gravity * np.cos(i.angle_of_ice) * ones,
-            DRAG_OF_EQ8: drag * (v[free] - share * v.mean()),
-            DRAG_OF_FREE_FLIGHT: drag * v[free]
-            + throw.drag * v[free].sum() / (throw.bottle.mass + throw.slice_mass * np.sum(~free)),
+            DRAG_OF_EQ8: drag * (v[free] - _water_share(throw) * v.mean()),
+            DRAG_OF_FREE_FLIGHT: drag * v[free] + reaction,
+            REACTION: reaction,
             "the drag alpha v / m": drag * v[free],
-            "the drag alpha v_CM / m": drag * share * v.mean() * ones,
-            "the drag alpha mean(v) / m": drag * v.mean() * ones,
+            "the drag alpha v_CM / m": drag * _water_share(throw) * v.mean() * ones,
+            MEAN_DRAG: drag * v.mean() * ones,
             "omega v": abs(omega) * v[free],
             "gamma^2 (r - r_CM + g cos(theta) / omega^2)": (drag / 2) ** 2
             * (r[free] - centre + throw.gravity * np.cos(theta) / omega**2),
@@ -379,33 +400,55 @@ def _motion_cause(intervals: Sequence[Interval], *, seldom: bool) -> str:
         for name, values in terms.items():
             rows.setdefault(name, []).append(values)
         extra.append((i.v[1] - i.expected["v"])[free] / h)
-    table, target = {name: np.concatenate(values) for name, values in rows.items()}, np.concatenate(extra)
-    size = rms(target)
-    if not size:
-        return ""
-    names = [name for name, values in table.items() if np.any(values)]
-    for count in (1, 2, 3):
-        best = None
-        for chosen in combinations(names, count):
-            columns = np.array([table[name] for name in chosen]).T
-            factors, *_ = np.linalg.lstsq(columns, target, rcond=1e-9)
-            residual = rms(columns @ factors - target) / size
-            if best is None or residual < best[0] - 1e-6:
-                best = residual, chosen, factors
-        if best is not None and best[0] < 0.03:
-            if best[1] == ("the drag alpha mean(v) / m",) and abs(best[2][0] - (1.0 - share)) < 0.02:
-                return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
-            if best[1] in ((DRAG_OF_EQ8,), (DRAG_OF_FREE_FLIGHT,)):
-                return f"{best[1][0]}, counts {1.0 - best[2][0]:.2g} times" + (
-                    " there: look at the velocity that v is measured against while slices rest"
-                    if seldom
-                    else ": look at alpha / m, twice the damping rate"
-                )
-            if best[1] == (WEIGHT_OF_ITS_OWN,) and best[2][0] > 0.0:
-                return f"slices weigh as if g were {best[2][0]:.3g} m/s^2 where it is 0: take gravity from the throw"
-            parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(best[1], best[2], strict=True))
-            return f"its slices accelerate by {parts} besides"
-    return ""
+    table = {name: np.concatenate(values) for name, values in rows.items()}
+    return {name: values for name, values in table.items() if np.any(values)}, np.concatenate(extra)
+
+
+def _water_share(throw: Scenario) -> float:
+    return throw.slice_mass * throw.n_slices / throw.total_mass
+
+
+def _explained(
+    table: Mapping[str, FloatArray], target: FloatArray, count: int, rest: float
+) -> tuple[tuple[str, ...], FloatArray] | None:
+    """Return the names and factors of the ``count`` terms that explain most, if at most a ``rest`` of a target remains.
+
+    Of single terms that do so, one that is missing, or there twice, comes first. A strong drag changes the speeds
+    within an interval: more may remain of it, if every other term leaves three times as much.
+    """
+    size, found = rms(target), []
+    for chosen in combinations(table, count):
+        columns = np.array([table[name] for name in chosen]).T
+        factors, *_ = np.linalg.lstsq(columns, target, rcond=1e-9)
+        residual = rms(columns @ factors - target) / size if size else np.inf
+        found.append((count > 1 or abs(abs(factors[0]) - 1.0) > 0.02, round(residual, 6), chosen, factors))
+    good = [fit for fit in found if fit[1] < rest]
+    if not good:
+        return None
+    _, residual, names, factors = min(good, key=lambda fit: fit[:2])
+    whole = names in WHOLE_DRAGS and sum(fit[1] < 3.0 * residual for fit in found) == 1
+    return (names, factors) if rest <= EXPLAINED or whole else None
+
+
+def _motion_words(throw: Scenario, names: tuple[str, ...], factors: FloatArray, where: str, *, seldom: bool) -> str:
+    """Return in words by which terms slices of a throw accelerate besides those of the equation, and where they do."""
+    factor = float(factors[0])
+    if names == (MEAN_DRAG,) and abs(factor - (1.0 - _water_share(throw))) < 0.02:
+        return "drag is taken against mean(v), the mean velocity of the water, instead of v_CM"
+    if names in WHOLE_DRAGS:
+        return f"{names[0]}, counts {1.0 - factor:.2g} times" + (
+            " there: look at the velocity that v is measured against while slices rest"
+            if seldom
+            else f"{where}: look at alpha / m, twice the damping rate"
+        )
+    if names == (REACTION,):
+        return (
+            f"{REACTION}, counts {1.0 - factor:.2g} times{where}: look at what the drag of the slices does to the tube"
+        )
+    if names == (WEIGHT_OF_ITS_OWN,) and factor > 0.0:
+        return f"slices weigh as if g were {factor:.3g} m/s^2 where it is 0: take gravity from the throw"
+    parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(names, factors, strict=True))
+    return f"its slices accelerate by {parts} besides"
 
 
 def _slice_cause(intervals: Sequence[Interval]) -> str:

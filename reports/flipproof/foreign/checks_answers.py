@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -28,6 +29,7 @@ from flipproof.foreign.checking import (
 )
 from flipproof.foreign.contract import IMPACT, Answer, Ask, Traits
 from flipproof.foreign.place import switches_of
+from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass, moment_of_inertia
 from slicemodel.schemes import SCHEMES
 from slicemodel.trajectory import FloatArray, Impacts
@@ -58,15 +60,28 @@ def check_ice(traits: Traits) -> CheckGenerator:
         observed=f"{worst} off by {errors[worst].max():.2g}",
         where=f"scenario.frozen = True, {time_of_max(ask.times, errors[worst])}",
         advice=(_turning_advice(answer.theta - THROW.theta0, turned) if worst == "theta" and not wrapped else "")
-        or _ice_advice(worst, wrapped, right_at_first=float(errors["theta"][0]) <= bounds["theta"]),
+        or _ice_advice(
+            worst,
+            wrapped,
+            right_at_first=float(errors["theta"][0]) <= bounds["theta"],
+            still="r" in errors and float(errors["r"].max()) <= bounds["r"],
+        ),
         facts={"drift": float(errors["omega"].max())},
     )
 
 
-def _ice_advice(worst: str, wrapped: bool, *, right_at_first: bool) -> str:
-    """Return what to look at if ice is wrong in one field: theta wrapped, or right at first and wrong later."""
+def _ice_advice(worst: str, wrapped: bool, *, right_at_first: bool, still: bool) -> str:
+    """Return what to look at if ice is wrong in one field: theta wrapped, or right at first and wrong later.
+
+    ``still`` says that no slice moves in the answer.
+    """
     if wrapped:
         return WRAPPED
+    if worst == "omega" and still:
+        return (
+            "no slice moves, so that ice is frozen; a rigid bottle turns on evenly: look at how a step advances omega, "
+            "and at J"
+        )
     if worst != "theta":
         return "hold every slice where it is when scenario.frozen is true"
     if not right_at_first:
@@ -358,13 +373,19 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     sizes = {name: [float(each[name].max()) for each in by_level] for name in errors}
     wrong = [name for name in sizes if not (sizes[name][0] <= bound or falls_with_step(sizes[name]))]
     worst = max(wrong or sizes, key=lambda name: sizes[name][0])
+    centre = _centre_advice(answer.r, answer.r_cm) if "r_cm" in wrong and answer.r_cm is not None else ""
+    if centre:
+        worst = "r_cm"  # J may follow from it
     values = np.asarray(getattr(answer, worst))
     hint = _decimals_advice(answer) + _delay_advice(values, derived[worst])
-    if worst == "inertia":
-        hint += parts_advice(answer.r, values) or _beyond_advice(answer, errors["inertia"] > bound)
-    elif np.max(np.abs(values + derived["r_cm"] - THROW.bottle.length)) < bound * THROW.bottle.length:
-        hint += "r_cm is L minus the right one: measure it from the cap; "
     moves = np.ptp(values) > bound * np.max(np.abs(values))
+    if not moves and errors[worst][0] <= bound:
+        hint += f"{worst} stays what it is at release: answer that of each instant; "
+    elif worst == "inertia":
+        hint += parts_advice(answer.r, values) or _axis_advice(values, derived)
+        hint = hint or _beyond_advice(answer, errors["inertia"] > bound)
+    else:
+        hint += centre
     if wrong and not hint and answer.t[0] == 0.0 and errors[worst][0] <= bound and moves:
         hint = yield from _drift_advice(traits, answer, worst, bound)
     return Observation(
@@ -502,12 +523,58 @@ def parts_advice(r: FloatArray, inertia: FloatArray) -> str:
         for mistake, factor in shifts.items():
             if abs(factors[2] - factor) < 1e-3:
                 return f"{mistake}; "
+    if np.max(np.abs(factors[1:] - 1.0)) < 1e-3:
+        excess = (factors[0] - 1.0) * float(columns[0, 0])
+        for part, size in _constants(THROW).items():
+            if abs(abs(excess) - size) < 0.01 * size:
+                return f"J has {part} too {'much' if excess > 0 else 'little'}; "
     wrong = [
         f"{name} counts {f:.3g} times ({meaning})"
         for name, meaning, f in zip(parts, words, factors, strict=True)
         if abs(f - 1.0) > 1e-3
     ]
     return f"in J = {' + '.join(parts)}, {' and '.join(wrong)}; " if wrong else ""
+
+
+def _axis_advice(inertia: FloatArray, derived: Mapping[str, FloatArray]) -> str:
+    """Return about which place of the bottle J is taken instead of the common centre of mass, if it is one of three."""
+    length = THROW.bottle.length
+    for name, place in {"the cap": 0.0, "the base": length, "the bottle's middle": length / 2}.items():
+        shift = THROW.total_mass * (derived["r_cm"] - place) ** 2
+        if np.max(np.abs(inertia - derived["inertia"] - shift)) < 1e-3 * np.max(shift):
+            return f"J is about {name} instead of the common centre of mass; "
+    return ""
+
+
+def _centre_advice(r: FloatArray, r_cm: FloatArray) -> str:
+    """Return how r_cm is made of the places of slices and bottle, if the masses or the end are wrong."""
+    length, expected = THROW.bottle.length, centre_of_mass(THROW, r)
+    if np.max(np.abs(r_cm + expected - length)) < 2e-5 * length:
+        return "r_cm is L minus the right one: measure it from the cap; "
+    columns = np.column_stack((r.mean(axis=1), np.full(len(r), length / 2)))
+    shares, *_ = np.linalg.lstsq(columns, r_cm, rcond=1e-12)
+    if np.max(np.abs(columns @ shares - r_cm)) > 1e-4 * length:
+        return ""
+    water, bottle = (float(share) for share in shares)
+    if abs(bottle) < 1e-3 and abs(water - 1.0) < 1e-3:
+        return "r_cm is mean(r), that of the water alone; "
+    if abs(water + bottle - 1.0) < 1e-3 and bottle > 0.0:
+        weight = water / bottle * THROW.bottle.mass / THROW.water_mass
+        return f"r_cm is that of water which weighs {weight:.3g} times as much; "
+    return f"r_cm is {water:.3g} mean(r) + {bottle:.3g} L/2: these shares are M_w/M and M_b/M; "
+
+
+def _constants(throw: Scenario) -> dict[str, float]:
+    """Return what a moment of inertia may have too much or too little whatever the places of slices are [kg m^2]."""
+    bottle, water, height = throw.bottle, throw.water_mass, throw.slice_height
+    disc = {"M_w R^2/4": water * bottle.radius**2 / 4, "M_w h^2/12 of slices of height h": water * height**2 / 12}
+    return {
+        **{f"M_b R^2/{n}": bottle.mass * bottle.radius**2 / n for n in (2, 4, 12)},
+        **{f"M_b L^2/{n}": bottle.mass * bottle.length**2 / n for n in (4, 12)},
+        **disc,
+        "M_w (R^2/4 + h^2/12) of slices of height h": sum(disc.values()),
+        "M_w R^2/2": water * bottle.radius**2 / 2,
+    }
 
 
 def _decimals_advice(answer: Answer) -> str:

@@ -257,6 +257,17 @@ def _on_grid(throw: Scenario, times: FloatArray, traits: Traits) -> Ask:
     return Ask.of(throw, times, effort)
 
 
+CHANGES: Final[Mapping[str, str]] = {
+    "signs": "that the drag damps",
+    "roots": "the roots of Eq. 9a, omega^2 for omega^2 - gamma^2",
+    "drag_on_centre": "what the drag is measured against, C_M or the bottle",
+    "weightless": "the weight along the axis, g cos(theta)",
+    "origin": "what the drag does to the tube",
+    "recoil": "the recoil of the tube in impacts",
+}
+"""What each switch changes in an equation."""
+
+
 def check_equation(traits: Traits) -> CheckGenerator:
     """The solver is nearest to the equation it declares, and no farther from it than its own error explains."""
     place = yield from placing(traits)
@@ -282,6 +293,14 @@ def check_equation(traits: Traits) -> CheckGenerator:
         simpler = yield from elsewhere.simpler_throws_advice(traits, declared)
     advice = simpler or (departure and f"there it departs {departure}; {cause and f'{cause}; '}")
     advice = advice or (place.advice and f"{place.advice}; ")
+    if (place.on_lattice or place.clear) and place.equation != declared:
+        wanted = switches_of(declared)
+        differing = [
+            words
+            for name, words in CHANGES.items()
+            if name not in place.inert and getattr(place.switches, name) != getattr(wanted, name)
+        ]
+        advice += f"{declared} differs from {place.equation} in {' and in '.join(differing)}; "
     return Observation(
         holds=holds and not deviation,
         expected=declared,

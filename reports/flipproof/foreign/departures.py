@@ -182,6 +182,10 @@ def _departing(traits: Traits, equation: str, asks: Sequence[Ask]) -> DepartureG
             intervals = yield from _intervals_at(traits, equation, asks, level)
         except ForeignError:
             if coarse:  # too slow for such fine steps
+                with suppress(ForeignError):
+                    longer = yield from _intervals_at(traits, equation, asks, LONG)
+                    departs = _departs(traits, coarse, longer)
+                    return _describe(equation, coarse, departs) if departs.sum() >= FEW else spoiled
                 return spoiled
             if level == LEVELS[-1]:
                 raise

@@ -9,6 +9,7 @@ from planted import InProcess, Patch, patches
 
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
 from flipproof.foreign.checking import NotApplicableError, drive
+from flipproof.foreign.contract import ForeignError
 from flipproof.foreign.departures import departing
 from flipproof.foreign.elsewhere import STICKY, WHOLE
 from slicemodel.observables import moment_of_inertia
@@ -53,6 +54,22 @@ def test_a_term_or_an_impact_that_is_wrong_is_named_with_its_factor(thrown, besi
     line = told(Exact, WHOLE, besides, thrown=thrown)
     for part in words:
         assert part in line
+
+
+class TooSlow(Exact):
+    """Gives no answer at the finer levels."""
+
+    def solve(self, ask):
+        if ask.effort < ask.scenario.duration / 961:
+            raise ForeignError("no answer within 60 s")
+        return super().solve(ask)
+
+
+def test_a_solver_too_slow_to_be_refined_is_held_against_longer_steps():
+    assert told(TooSlow, WHOLE, STICKY, equation="eq8") == " / "
+    line = told(TooSlow, WHOLE, BOUNCING, thrown=lambda _, throw: replace(throw, restitution=0.9 * throw.restitution))
+    assert "with an impact, in none of" in line
+    assert "leaves as if e were 0.45 where it is 0.5, and the others are right" in line
 
 
 def test_a_weight_that_takes_the_angle_of_ice_is_named():
