@@ -448,7 +448,7 @@ def _motion_words(throw: Scenario, names: tuple[str, ...], factors: FloatArray, 
     if names == (WEIGHT_OF_ITS_OWN,) and factor > 0.0:
         return f"slices weigh as if g were {factor:.3g} m/s^2 where it is 0: take gravity from the throw"
     parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(names, factors, strict=True))
-    return f"its slices accelerate by {parts} besides"
+    return f"its slices accelerate by {parts} besides{where}"
 
 
 def _slice_cause(intervals: Sequence[Interval]) -> str:
