@@ -332,9 +332,11 @@ DRAG_OF_FREE_FLIGHT: Final = "the drag, alpha v / m + alpha sum(v) / M_c"
 """Terms that are all of an equation's drag."""
 
 WHOLE_DRAGS: Final = ((DRAG_OF_EQ8,), (DRAG_OF_FREE_FLIGHT,))
+"""The same, as single terms of a fit."""
 
 EXPLAINED: Final = 0.03
-"""Share of an acceleration that may remain beside terms that explain it."""
+OF_STRONG_DRAG: Final = 0.1
+"""Share of an acceleration that may remain beside terms that explain it; beside all of a drag alone, the second."""
 
 REACTION: Final = "the drag's reaction on the tube, alpha sum(v) / M_c"
 MEAN_DRAG: Final = "the drag alpha mean(v) / m"
@@ -352,7 +354,7 @@ def _motion_cause(samples: Sequence[Sequence[Interval]], *, seldom: bool) -> str
     if (field := _only_field(samples[0])) not in ("", "v"):
         return f"{field} alone is off"
     fits = [(intervals, *fit) for intervals in samples if (fit := _terms_of(intervals)) is not None]
-    for count, rest in ((1, EXPLAINED), (1, 0.1), (2, EXPLAINED), (3, EXPLAINED)):
+    for count, rest in ((1, EXPLAINED), (1, OF_STRONG_DRAG), (2, EXPLAINED), (3, EXPLAINED)):
         for intervals, table, target in fits:
             if explained := _explained(table, target, count, rest):
                 throw = intervals[0].throw

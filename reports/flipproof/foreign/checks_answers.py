@@ -382,8 +382,11 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     if not moves and errors[worst][0] <= bound:
         hint += f"{worst} stays what it is at release: answer that of each instant; "
     elif worst == "inertia":
-        hint += parts_advice(answer.r, values) or _axis_advice(values, derived)
-        hint = hint or _beyond_advice(answer, errors["inertia"] > bound)
+        hint += (
+            parts_advice(answer.r, values)
+            or _axis_advice(values, derived)
+            or _beyond_advice(answer, errors["inertia"] > bound)
+        )
     else:
         hint += centre
     if wrong and not hint and answer.t[0] == 0.0 and errors[worst][0] <= bound and moves:
@@ -569,7 +572,7 @@ def _constants(throw: Scenario) -> dict[str, float]:
     bottle, water, height = throw.bottle, throw.water_mass, throw.slice_height
     disc = {"M_w R^2/4": water * bottle.radius**2 / 4, "M_w h^2/12 of slices of height h": water * height**2 / 12}
     return {
-        **{f"M_b R^2/{n}": bottle.mass * bottle.radius**2 / n for n in (2, 4, 12)},
+        **{f"M_b R^2/{n}": bottle.mass * bottle.radius**2 / n for n in (2, 4)},
         **{f"M_b L^2/{n}": bottle.mass * bottle.length**2 / n for n in (4, 12)},
         **disc,
         "M_w (R^2/4 + h^2/12) of slices of height h": sum(disc.values()),
