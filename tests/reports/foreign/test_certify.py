@@ -627,6 +627,63 @@ def test_of_impacts_at_one_instant_the_recoil_may_send_one_off_faster(equation, 
     assert result.verdict == verdict
 
 
+def spoilt_water(_, answer):
+    return answer | {"r_cm": answer["r"].mean(axis=1)}
+
+
+def spoilt_weight(throw, answer):
+    water = 2 * throw.water_mass
+    centre = (water * answer["r"].mean(axis=1) + throw.bottle.mass * throw.bottle.length / 2) / (
+        water + throw.bottle.mass
+    )
+    return answer | {"r_cm": centre}
+
+
+def more_inertia(of):
+    return lambda throw, answer: answer | {"inertia": answer["inertia"] + of(throw, answer["r_cm"])}
+
+
+@pytest.mark.parametrize(
+    ("check", "spoilt", "words"),
+    [
+        ("definitions", more_inertia(lambda throw, r_cm: throw.total_mass * r_cm**2), "J is about the cap instead of"),
+        (
+            "definitions",
+            more_inertia(lambda throw, _: throw.water_mass * throw.bottle.radius**2 / 4),
+            "J has M_w R^2/4 too m",
+        ),
+        (
+            "definitions",
+            more_inertia(lambda throw, _: -throw.bottle.mass * throw.bottle.length**2 / 12),
+            "L^2/12 too little",
+        ),
+        (
+            "definitions",
+            lambda _, answer: answer | {"inertia": 0 * answer["t"] + answer["inertia"][0]},
+            "inertia stays what",
+        ),
+        ("definitions", spoilt_water, "r_cm is mean(r), that of the water alone"),
+        ("definitions", spoilt_weight, "r_cm is that of water which weighs 2 times as much"),
+        (
+            "ice",
+            lambda _, answer: answer | {"omega": answer["omega"] * (1 + 0.1 * answer["t"])},
+            "no slice moves, so that",
+        ),
+    ],
+)
+def test_a_wrong_definition_is_named_by_what_is_wrong_in_it(check, spoilt, words):
+    solver = type("Spoilt", (Exact,), {"spoilt": lambda _, throw, answer: spoilt(throw, answer)})()
+    (result,) = certify(InProcess(solver, "x"), [check]).results
+    assert result.verdict == FAILED
+    assert words in result.text
+
+
+def test_an_equation_without_recoil_is_told_from_one_with_it():
+    solver = InProcess(type("NoRecoil", (Exact,), {"equation": "accelerating-origin"})(), "x")
+    (result,) = certify(solver, ["equation"], equation="free-flight").results
+    assert "free-flight differs from accelerating-origin in the recoil of the tube in impacts" in result.text
+
+
 def test_what_an_impact_spoils_is_named_as_the_impacts():
     (result,) = certify(InProcess(MISTAKES["WallsAtTheEnds"](), "x"), ["restitution"]).results
     assert "slices turn" in result.line
