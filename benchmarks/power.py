@@ -47,7 +47,7 @@ from planted.ours import MISTAKES
 from planted.right import RIGHT
 
 from flipproof.foreign.certify import FAILED, certify
-from flipproof.foreign.contract import Answer, Ask, ForeignError
+from flipproof.foreign.contract import Answer, Ask, ForeignError, LateError
 
 BLIND: Final = (
     "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "eleventh",
@@ -95,7 +95,7 @@ class Limited(InProcess):
         """Return the checked answer."""
 
         def late(*_: object) -> None:
-            raise ForeignError("no answer within 60 s of processor time")
+            raise LateError("no answer within 60 s of processor time")
 
         if hasattr(signal, "setitimer"):
             signal.signal(signal.SIGPROF, late)

@@ -33,7 +33,7 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
         return f"the answer stands still there, first at t = {min(still):.3g} s"
     if all(not np.any(i.v) and not np.any(np.diff(i.r, axis=0)) for i in intervals) and any(map(_off_ends, intervals)):
         return "its slices do not move: look at what is taken for ice"
-    if held := _held(intervals):
+    if held := _stays(intervals) or _held(intervals):
         return held
     if np.mean([whole_turns(i.theta[1] - i.expected["theta"], 1e-4) for i in intervals]) > 0.5:
         return WRAPPED
@@ -53,6 +53,21 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
             or (STALE_OMEGA if np.median([i.departure["omega"] for i in intervals]) > OFF_MOMENTUM else "")
         )
     return ""
+
+
+def _stays(intervals: Sequence[Interval]) -> str:
+    """Return that slices rest from an impact on which the equation lets rebound, if most that strike alone do."""
+    stays = [
+        i.speeds[0] if not i.v[1][i.hits[0][0]] and not i.after[i.hits[0][0]] else 0.0
+        for i in intervals
+        if len(i.hits) == 1 and i.throw.restitution
+    ]
+    if not stays or np.mean(np.array(stays) > 0.0) < 0.6:
+        return ""
+    return (
+        f"the slice that strikes, at up to {max(stays):.2g} m/s, rests from then on: look at the speed below which "
+        "a slice rests"
+    )
 
 
 def _held(intervals: Sequence[Interval]) -> str:
@@ -140,12 +155,6 @@ def _impact_cause(intervals: Sequence[Interval], *, recoil: bool) -> str:
         )
     if other_error < 0.05 * own_error:
         return f"{_restitution_cause(single)}, and the others are right"
-    stays = [i.speeds[0] for i in single if not i.v[1][i.hits[0][0]] and not i.after[i.hits[0][0]]]
-    if len(stays) > 0.6 * len(single):
-        return (
-            f"the slice that strikes, at up to {max(stays):.2g} m/s, rests from then on: look at the speed below which "
-            "a slice rests"
-        )
     if not recoil:
         return "the slice that strikes and the others are off, which no impact of this equation moves"
     if cause := _common_restitution(single):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
@@ -13,7 +14,8 @@ import numpy as np
 
 from flipproof.foreign import checks_answers, checks_laws, checks_measured, checks_questions, elsewhere
 from flipproof.foreign.checking import Check, NotApplicableError, Observation, drive
-from flipproof.foreign.contract import Answer, Ask, ForeignError, Runner, Traits, WaitingError
+from flipproof.foreign.contract import Answer, Ask, ForeignError, LateError, Runner, Traits, WaitingError
+from flipproof.foreign.late import until_when
 from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
@@ -203,7 +205,8 @@ class _Recorder(Runner):
         self.runner, self.traits = runner, runner.traits
         self.answers: dict[tuple[Any, ...], Answer] = {}
         self.domain: dict[str, tuple[float, float]] = {}
-        self.asked = ""
+        self.last: Ask | None = None
+        self.late = False
 
     def __call__(self, ask: Ask) -> Answer:
         key = ask.scenario, ask.times.tobytes(), ask.start.tobytes(), ask.effort
@@ -213,12 +216,23 @@ class _Recorder(Runner):
 
     def ask_again(self, ask: Ask) -> Answer:
         """Ask, even if the same was asked before, and return the answer."""
-        self.asked = f"{ASKED}{_question(ask)}"
+        self.last = ask
         answer = self.runner(ask)
         for name, (_, value) in VARIED.items():
             values = np.append(value(ask), self.domain.get(name, ())) + 0.0  # a sticky throw's e is -0.0
             self.domain[name] = float(values.min()), float(values.max())
         return answer
+
+    def question(self, error: ForeignError, equation: str | None) -> str:
+        """Return what was asked last, and the first time that the answer was late, until when one comes."""
+        if self.last is None:
+            return ""
+        until = ""
+        if isinstance(error, LateError) and not self.late and equation is not None:
+            self.late = True
+            with suppress(ValueError):  # another error, or an equation that has no limit
+                until = until_when(self.last, self.runner, equation)
+        return f"{ASKED}{_question(self.last)}" + (f"; {until}" if until else "")
 
 
 def certify(
@@ -277,7 +291,7 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     except NotApplicableError as why:
         return result(verdict=IDLE, reason=str(why), facts=why.facts)
     except ForeignError as error:
-        message = f"{error}{recorder.asked}" + (f"; known: {reason}" if reason else "")
+        message = f"{error}{recorder.question(error, traits.equation)}" + (f"; known: {reason}" if reason else "")
         return result(verdict=FAILED if reason is None else EXPECTED, reason=message)
     result = partial(result, facts=observation.facts)
     if observation.holds and reason is not None:

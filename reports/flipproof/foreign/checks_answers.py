@@ -27,7 +27,8 @@ from flipproof.foreign.checking import (
     time_of_max,
     whole_turns,
 )
-from flipproof.foreign.contract import IMPACT, Answer, Ask, Traits
+from flipproof.foreign.contract import IMPACT, Answer, Ask, ForeignError, Traits
+from flipproof.foreign.departures import UNEXPLAINED, departing
 from flipproof.foreign.place import switches_of
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass, moment_of_inertia
@@ -262,6 +263,11 @@ SLOW: Final = replace(THROW, omega0=THROW.omega0 / 8, duration=8 * THROW.duratio
 """A throw that turns as far as ``THROW`` in eight times the time."""
 
 
+LISTED: Final = "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered"
+RIGHT_MOTION: Final = "from one output to the next the motion is right"
+"""What to look at if the speeds of impacts are wrong, and what is said if no motion between outputs is."""
+
+
 DEFINED: Final = {
     "r_cm": "r_cm is the centre of mass of bottle and water, from the cap: look at the masses, and at where it begins",
     "inertia": "J is that about the common centre of mass, with the bottle's own: look at the masses, at the bottle's "
@@ -294,30 +300,22 @@ def _rebound_advice(hits: Impacts) -> str:
     return f"{' and '.join(wrong)}: look at the rebound, and at what is answered of it" if wrong else ""
 
 
-def _speeds_advice(traits: Traits, hits: Impacts) -> elsewhere.TextGenerator:
-    """Return whether the impacts are wrong or only the speeds answered of them: v is asked just before and after each.
+def _departure_advice(traits: Traits, otherwise: str) -> elsewhere.TextGenerator:
+    """Return where a solver departs from its equation between two outputs, and by what, if that is known.
 
-    The faster half of the slices counts: meanwhile they change their speed by some per cent at most.
+    If it departs nowhere return ``otherwise``.
     """
-    room = 1e-4 * THROW.duration
-    ends = np.concatenate(([0.0], hits.time, [THROW.duration]))
-    lone = np.minimum(np.diff(ends)[:-1], np.diff(ends)[1:]) > 4 * room
-    struck = np.flatnonzero(lone & (hits.speed_after > 0.0))
-    times = (hits.time[struck, None] + (-room, room)).ravel()
-    factor = 0.0
-    if len(struck):
-        times.setflags(write=False)
-        (close,) = yield [replace(ask_of(traits, THROW, 2 if traits.refined_by else 0), times=times)]
-        if close.v is not None:
-            v = np.array([close.v[2 * k : 2 * k + 2, index] for k, index in enumerate(hits.slice[struck])])
-            fast = v[np.abs(v[:, 0]) >= np.median(np.abs(v[:, 0]))]
-            factor = float(np.median(-fast[:, 1] / np.where(fast[:, 0], fast[:, 0], np.inf)))
-    text = "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered"
-    if abs(factor / THROW.restitution - 1.0) < 0.1:
-        return f"{text}, for in v slices do rebound at e times their speed"
-    if factor > 0.0:
-        return f"in v, too, slices rebound at {factor:.2g} of it: look at what an impact does to slice and bottle"
-    return f"{text}, and at what an impact does"
+    if traits.equation is None or traits.equation in SCHEMES:
+        return ""
+    try:
+        where, advice = yield from departing(traits, traits.equation, [knobs.ask(0) for knobs in elsewhere.PIECES])
+    except (NotApplicableError, ForeignError):
+        return ""
+    if not where:
+        return otherwise
+    return (
+        f"it departs from {traits.equation} {where}: {advice}" if advice not in ("", UNEXPLAINED, STALE_OMEGA) else ""
+    )
 
 
 def _ends_exchanged(answer: Answer, hits: Impacts) -> bool:
@@ -357,7 +355,13 @@ def check_definitions(traits: Traits) -> CheckGenerator:
                 advice="look at the sign of the end in the answered impacts",
             )
         if not (holds and answer.r is not None and given):
-            advice = _rebound_advice(hits) or (yield from _speeds_advice(traits, hits))
+            advice = "" if holds else _rebound_advice(hits)
+            if not (holds or advice):
+                advice = yield from _departure_advice(traits, f"{RIGHT_MOTION}, {LISTED}")
+                if not advice and answer.r is not None and given and answer.t[0] == 0.0:
+                    drifts = [n for n, errors in _defined(answer)[1].items() if n in given and errors.max() > bound]
+                    advice = (yield from _drift_advice(traits, answer, drifts[0], bound)) if drifts else ""
+                advice = advice or LISTED
             return Observation(
                 holds=holds,
                 expected="speed_after = e speed_before of each of the impacts, or 0",
@@ -374,8 +378,8 @@ def check_definitions(traits: Traits) -> CheckGenerator:
     wrong = [name for name in sizes if not (sizes[name][0] <= bound or falls_with_step(sizes[name]))]
     worst = max(wrong or sizes, key=lambda name: sizes[name][0])
     centre = _centre_advice(answer.r, answer.r_cm) if "r_cm" in wrong and answer.r_cm is not None else ""
-    if centre:
-        worst = "r_cm"  # J may follow from it
+    if centre or (len(wrong) > 1 and _follows(answer, derived)):
+        worst = "r_cm"
     values = np.asarray(getattr(answer, worst))
     hint = _decimals_advice(answer) + _delay_advice(values, derived[worst])
     moves = np.ptp(values) > bound * np.max(np.abs(values))
@@ -388,7 +392,7 @@ def check_definitions(traits: Traits) -> CheckGenerator:
             or _beyond_advice(answer, errors["inertia"] > bound)
         )
     else:
-        hint += centre
+        hint += centre or _release_advice(answer, derived["r_cm"], bound)
     if wrong and not hint and answer.t[0] == 0.0 and errors[worst][0] <= bound and moves:
         hint = yield from _drift_advice(traits, answer, worst, bound)
     return Observation(
@@ -537,6 +541,26 @@ def parts_advice(r: FloatArray, inertia: FloatArray) -> str:
         if abs(f - 1.0) > 1e-3
     ]
     return f"in J = {' + '.join(parts)}, {' and '.join(wrong)}; " if wrong else ""
+
+
+def _follows(answer: Answer, derived: Mapping[str, FloatArray]) -> bool:
+    """Return whether J is off by M (r_cm - that which follows from r)^2: taken about the r_cm answered."""
+    assert answer.inertia is not None
+    assert answer.r_cm is not None
+    shift = THROW.total_mass * (answer.r_cm - derived["r_cm"]) ** 2
+    return bool(np.max(np.abs(answer.inertia - derived["inertia"] - shift)) < 1e-3 * np.max(shift))
+
+
+def _release_advice(answer: Answer, expected: FloatArray, bound: float) -> str:
+    """Return how r_cm is wrong at release already, if it is."""
+    middle = THROW.bottle.length / 2
+    if answer.t[0] > 0.0 or answer.r_cm is None or abs(answer.r_cm[0] - expected[0]) <= bound * THROW.bottle.length:
+        return ""
+    share = (answer.r_cm[0] - middle) / (expected[0] - middle)
+    return (
+        f"already at release it is {share:.3g} times as far from the bottle's middle as it should be: look at the sum "
+        "over the slices and the masses with which it begins; "
+    )
 
 
 def _axis_advice(inertia: FloatArray, derived: Mapping[str, FloatArray]) -> str:

@@ -169,7 +169,7 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         if orders[worst] >= required:
             break
     where = f"0.05 s in which the equation has no impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves"
-    observed, advice = f"{orders[worst]:.2f} ({worst})", ""
+    observed, advice, calm = f"{orders[worst]:.2f} ({worst})", "", ""
     if holds := orders[worst] >= required:
         for fractions in (FRACTIONS[1:2], FRACTIONS[1:]):
             uneven_changes = yield from _changes_before(traits, SMOOTH, levels, fractions, uneven=True)
@@ -204,11 +204,20 @@ def check_order_before(traits: Traits) -> CheckGenerator:
                 advice += "advanced, with the omega of which instant"
                 break
             if orders_without and min(orders_without.values()) >= required:
-                advice = (
-                    f"of that order without {name}: look at the instant of {elsewhere.LOOK_AT[name]}, and whether an "
-                    "iteration with it converges"
-                )
+                calm = name
                 break
+        if not advice:
+            orders_inside = _orders(traits, (yield from _changes_before(traits, SMOOTH, levels, inside=True)))
+            flying = bool(orders_inside) and min(orders_inside.values()) >= required
+            term = elsewhere.LOOK_AT[calm] if calm else "the motion of the others"
+            if flying:
+                without = f"without {calm}, and " if calm else ""
+                advice = f"of that order {without}where no slice rests: look at the part of slices at rest in {term}"
+            elif calm:
+                advice = (
+                    f"of that order without {calm}: look at the instant of {term}, and whether an iteration with it "
+                    "converges"
+                )
     low, right = ([name for name, order in orders.items() if (order < required) == below] for below in (True, False))
     if low and right:
         default_advice = (
@@ -258,15 +267,17 @@ def _changes_before(
     fractions: Sequence[tuple[float, ...]] = FRACTIONS[:1],
     *,
     uneven: bool = False,
+    inside: bool = False,
 ) -> Generator[Sequence[Ask], Sequence[Answer], dict[str, list[float]]]:
     """Return by field how much it changes from level to level, a fraction of its largest value.
 
     Answers are compared at ``fractions`` of the throw, and the changes are root mean squares over these; with
-    ``uneven`` other times are asked, too, 0.4 and 0.8 of a step apart.
+    ``uneven`` other times are asked, too, 0.4 and 0.8 of a step apart; ``inside`` lets all slices go far from the ends.
     """
     changes: dict[str, list[list[float]]] = {}
+    start = elsewhere.far_from_ends(throw) if inside else throw.initial_positions()
     for common in throw.duration * np.array(fractions):
-        asks = [replace(ask_of(traits, throw, level), times=common) for level in levels]
+        asks = [replace(ask_of(traits, throw, level), times=common, start=start) for level in levels]
         if uneven:
             asks = [
                 replace(ask, times=np.union1d(common, _uneven_times(throw.duration, 960.0 / 1.2 * 2.0**level)))
@@ -392,17 +403,6 @@ def _singles(answer: Answer) -> list[str]:
 
 # ---------------------------------------------------------------------- from output to output
 
-PIECES: Final = (
-    elsewhere.WHOLE,
-    replace(elsewhere.STICKY, slices=5),
-    replace(elsewhere.RESTLESS, slices=5),
-    replace(elsewhere.WHOLE, gravity=0.0, damping=0.0, angle=5.0),
-    elsewhere.HELD,
-    replace(elsewhere.WHOLE, start="stacked on the cap"),
-)
-"""Throws with and without weight, drag, and rests on one or both ends, of an even and an odd number of slices."""
-
-
 CROWDED: Final = replace(elsewhere.RESTLESS, slices=20)
 """A throw of many slices, of which several strike in one long step."""
 
@@ -416,13 +416,13 @@ def check_piecewise(traits: Traits) -> CheckGenerator:
         raise NotApplicableError("told by the check of the equation")
     if traits.equation is None and not place.on_lattice:
         raise NotApplicableError("no equation is declared")
-    asks, crowded = [knobs.ask(0) for knobs in PIECES], [CROWDED.ask(0)]
-    departure, advice = yield from departures.departing(traits, declared, asks, crowded)
+    asks = [knobs.ask(0) for knobs in elsewhere.PIECES]
+    departure, advice = yield from departures.departing(traits, declared, asks, [CROWDED.ask(0)])
     return Observation(
         holds=not departure,
         expected=f"{declared} from one output to the next",
         observed=f"departs {departure}" if departure else "no departure beyond the step's own error",
-        where=f"{len(PIECES)} throws, begun anew from the solver's own state at each of {departures.OUTPUTS} outputs",
+        where=f"{len(asks)} throws, begun anew from the solver's own state at each of {departures.OUTPUTS} outputs",
         advice=advice,
     )
 

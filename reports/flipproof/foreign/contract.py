@@ -379,6 +379,10 @@ class ForeignError(ValueError):
     """A foreign solver gave no answer; the message says what happened, on one line."""
 
 
+class LateError(ForeignError):
+    """A foreign solver gave no answer within its time."""
+
+
 class WaitingError(ForeignError):
     """An answer that somebody has to write does not exist yet."""
 

@@ -42,7 +42,7 @@ from flipproof.foreign.place import name_of, placing, switches_of
 from ode_reference.solver import usual_rest_speed
 from ode_reference.switches import Switches
 from slicemodel import Bottle, Scenario, Trajectory
-from slicemodel.trajectory import NO_IMPACTS, FloatArray, Impacts
+from slicemodel.trajectory import BASE, CAP, NO_IMPACTS, FloatArray, Impacts
 
 SEED: Final = 26
 """Seed of the throws where none is named."""
@@ -369,7 +369,7 @@ class Comparison:
 
     ``own_error`` is the solver's own error of omega where it was compared, ``largest`` the largest difference of omega,
     ``share`` the share of output times that were compared. ``error`` says why there is no answer, ``onset`` after which
-    impact it goes wrong, ``impacts_passed`` how many it gets right before.
+    impact it goes wrong, ``impacts_passed`` how many it gets right before, ``listed`` what is wrong with its impacts.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
@@ -379,6 +379,7 @@ class Comparison:
     error: str = ""
     onset: str = ""
     impacts_passed: int = 0
+    listed: str = ""
 
     @property
     def largest_wrong(self) -> float:
@@ -435,6 +436,7 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
             row = int(np.argmax(rows > room))
             first_wrong = min(first_wrong, float(ask.times[:reached][clear][row]))
     impacts_passed, onset = _onset(ask, truth.impacts or NO_IMPACTS, first_wrong) if wrong else (0, "")
+    listed = ""
     if finest.impacts is not None and clear.any():
         room_of_r = rooms.get("r", rooms["omega"])[clear]
         by_rest_speed = [
@@ -444,6 +446,7 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
         unmatched = [miss for miss in by_rest_speed if miss is not None]
         if len(unmatched) == len(by_rest_speed):
             wrong["impacts"] = unmatched[0]
+            listed = _listed_wrongly(ask, finest.impacts, truth.impacts or NO_IMPACTS)
     return Comparison(
         wrong=wrong,
         own_error=float(np.max(own_errors["omega"][clear])) if clear.any() else float(own_errors["omega"].min()),
@@ -451,6 +454,7 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
         share=float(np.mean(clear)) * reached / len(ask.times),
         onset=onset,
         impacts_passed=impacts_passed,
+        listed=listed,
     )
 
 
@@ -508,6 +512,40 @@ def _unmatched(
             if distance > 2 * room and time + 2 * room * throw.duration < times[-1]:
                 misses.append((distance, 2 * room, float(time)))
     return max(misses, key=lambda miss: miss[0] / miss[1], default=None)
+
+
+def _listed_wrongly(ask: Ask, answered: Impacts, truth: Impacts) -> str:
+    """Return which impacts a list lacks, has besides, or gives another slice or end; empty if not clear."""
+    throw = ask.scenario
+    fast = FAINT * throw.bottle.length * abs(throw.omega0)
+    expected = np.flatnonzero((truth.speed_before > fast) & (truth.time < 0.999 * ask.times[-1]))
+    near = np.abs(answered.time[:, None] - truth.time) < 1e-3 * throw.duration
+    same = {name: getattr(answered, name)[:, None] == getattr(truth, name) for name in ("slice", "end")}
+    exact = near & same["slice"] & same["end"]
+    odd = ~exact.any(axis=1) & (answered.speed_before > fast)
+    lacking = [int(k) for k in expected if not exact[:, k].any()]
+    for name, other in (("slice", "end"), ("end", "slice")):
+        if named := [k for k in lacking if np.any(near[odd, k] & same[other][odd, k])]:
+            return f"{len(named)} of {len(expected)} name another {name}"
+    if lacking:
+        kinds = {
+            "on the cap": truth.end == CAP,
+            "on the base": truth.end == BASE,
+            **{f"of slice {k}": truth.slice == k for k in range(throw.n_slices)},
+            "after which a slice rests": truth.speed_after == 0.0,
+            "after the first": np.arange(len(truth)) > 0,
+        }
+        fits = [kind for kind, of_kind in kinds.items() if expected[of_kind[expected]].tolist() == lacking]
+        which = fits[0] if fits else f"at {times_text(truth.time[lacking])}"
+        return f"{len(lacking)} of {len(expected)} are missing, those {which}"
+    if odd.any():
+        return f"{np.sum(odd)} are listed where there is none, at {times_text(answered.time[odd])}"
+    return f"{len(answered)} are listed, {len(truth)} expected" if len(answered) != len(truth) else ""
+
+
+def times_text(times: FloatArray) -> str:
+    """Return at most three times [s] in words."""
+    return f"{', '.join(f'{time:.3g}' for time in times[:3])} s{' ...' if len(times) > 3 else ''}"
 
 
 ComparisonsGenerator = Generator[Sequence[Ask], Sequence[Answer], list[Comparison]]
@@ -770,6 +808,16 @@ HELD: Final = replace(
 )
 """One that begins with slices on both ends, and lets them go from both."""
 
+PIECES: Final = (
+    WHOLE,
+    replace(STICKY, slices=5),
+    replace(RESTLESS, slices=5),
+    replace(WHOLE, gravity=0.0, damping=0.0, angle=5.0),
+    HELD,
+    replace(WHOLE, start="stacked on the cap"),
+)
+"""Throws with and without weight, drag, and rests on one or both ends, of an even and an odd number of slices."""
+
 
 def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNREFINED) -> TextGenerator:
     """Return which of weight, drag, impacts or rests must be left out to be right, if any, and what to look at."""
@@ -869,6 +917,7 @@ def _field_advice(comparison: Comparison, prefix: str = "", *, ice: bool = False
         return ""
     fields = ", ".join(comparison.wrong)
     if set(comparison.wrong) == {"impacts"}:
-        return f"{prefix}the motion is right, the impacts listed are not: look at time, slice, end and number of each"
+        listed = comparison.listed or "look at time, slice, end and number of each"
+        return f"{prefix}the motion is right, the impacts listed are not: {listed}"
     closer = ", and at sign, unit and instant of v" if fields == "v" else ""
     return f"{prefix}omega is right, {fields} not: look at how the answer is put together{closer}"

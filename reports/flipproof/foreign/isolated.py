@@ -24,7 +24,17 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from flipproof.foreign import contract
-from flipproof.foreign.contract import IMPACT, Answer, AnswerError, Ask, ForeignError, Runner, Traits, answer_of
+from flipproof.foreign.contract import (
+    IMPACT,
+    Answer,
+    AnswerError,
+    Ask,
+    ForeignError,
+    LateError,
+    Runner,
+    Traits,
+    answer_of,
+)
 from flipproof.foreign.files import run_command
 from flipproof.foreign.processes import KEPT, PATIENCE, end, ending, half_of_memory, last_line, start
 from flipproof.foreign.specs import COMMAND, distribution_of, is_foreign, load, split_spec
@@ -132,7 +142,7 @@ class Isolated(Runner):
                     if remaining <= 0:
                         self._timeouts += 1
                         self.close()
-                        raise ForeignError(f"no answer within {limit:g} s; the process was ended")
+                        raise LateError(f"no answer within {limit:g} s; the process was ended")
                     events = ready.select(0.0 if dead else min(0.2, remaining))
                     if dead and not any(key.fileobj is not process.stdin for key, _ in events):
                         raise BrokenFrameError("the stream ended")  # its children may hold the pipes open

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import combinations
@@ -22,14 +23,15 @@ import ode_reference
 from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.checking import drive
-from flipproof.foreign.checks_measured import CROWDED, PIECES
-from flipproof.foreign.contract import IMPACT, Ask, ForeignError, started
+from flipproof.foreign.checks_measured import CROWDED
+from flipproof.foreign.contract import IMPACT, Ask, ForeignError, LateError, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.elsewhere import (
     COUNT,
     FACTORS,
     FULL,
     PAPER,
+    PIECES,
     SEED,
     SLOW,
     SMALL,
@@ -500,6 +502,31 @@ def test_a_solver_too_slow_for_the_finest_steps_is_not_accused():
     result = result_of("precision-floor", Slow, order=1.0)
     assert result.verdict == PASSED
     assert len(result.observation.facts["changes"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("works_until", "said"),
+    [
+        (
+            0.15,
+            r"it answers until t = 0\.08\d* s \(in \S+ s, omega off by 0\.05 of omega_0, before any impact\), but not until t = 0\.16\d* s; by free-flight, slice 1 strikes the base in between",
+        ),
+        (0.0, r"nor does it answer until t = 0\.08\d* s; by free-flight, nothing strikes in between"),
+    ],
+)
+def test_a_late_answer_says_until_when_one_comes_and_how_good_it_is(works_until, said):
+    class Hanging(Exact):
+        """Answers short throws, with an omega that is too small."""
+
+        def solve(self, ask):
+            if ask.times[-1] > works_until:
+                raise LateError("no answer within 60 s")
+            found = super().solve(ask)
+            return found | {"omega": found["omega"] - 0.05 * ask.scenario.omega0}
+
+    first, second = certify(InProcess(Hanging(), "x"), ["determinism", "inputs"]).results
+    assert re.fullmatch(rf"no answer within 60 s; asked: 61 times, .*; {said}", first.text)
+    assert second.text == "as in determinism"
 
 
 def test_slices_that_jump_have_no_speed_and_break_no_check():
