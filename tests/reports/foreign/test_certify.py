@@ -509,7 +509,8 @@ def test_a_solver_too_slow_for_the_finest_steps_is_not_accused():
     [
         (
             0.15,
-            r"it answers until t = 0\.08\d* s \(in \S+ s, omega off by 0\.05 of omega_0, before any impact\), but not until t = 0\.16\d* s; by free-flight, slice 1 strikes the base in between",
+            r"it answers until t = 0\.08\d* s \(in \S+ s, omega off by 0\.05 of omega_0, before any impact\), but not "
+            r"until t = 0\.16\d* s; by free-flight, slice 1 strikes the base in between",
         ),
         (0.0, r"nor does it answer until t = 0\.08\d* s; by free-flight, nothing strikes in between"),
     ],
@@ -670,9 +671,36 @@ def more_inertia(of):
     return lambda throw, answer: answer | {"inertia": answer["inertia"] + of(throw, answer["r_cm"])}
 
 
+def begun_nearer_to_the_middle(throw, answer):
+    """Answer an r_cm that begins with a quarter of the water, an error that grows, and J about it."""
+    error = 0.75 * (throw.bottle.length / 2 - answer["r_cm"][0]) * np.cosh(10.0 * answer["t"])
+    inertia = answer["inertia"] + throw.total_mass * error**2
+    return answer | {"r_cm": answer["r_cm"] + error, "inertia": inertia}
+
+
+def listed(chosen=lambda _: slice(None), **changed):
+    """Answer the list of impacts, too, but only those ``chosen``, and some of their fields ``changed``."""
+
+    def spoilt(throw, answer):
+        hits = ode_reference.solve(throw, Exact.equation, answer["t"]).impacts
+        kept = {name: getattr(hits, name)[chosen(hits)] for name in IMPACT}
+        return answer | {"impacts": kept | {name: change(kept) for name, change in changed.items()}}
+
+    return spoilt
+
+
 @pytest.mark.parametrize(
     ("check", "spoilt", "words"),
     [
+        (
+            "definitions",
+            begun_nearer_to_the_middle,
+            "already at release it is 0.25 times as far from the bottle's middle",
+        ),
+        ("elsewhere", listed(lambda hits: hits.end > 0), "are missing, those on the cap"),
+        ("elsewhere", listed(lambda hits: np.arange(len(hits)) < 1), "are missing, those after the first"),
+        ("elsewhere", listed(slice=lambda hits: 0 * hits["slice"]), "name another slice"),
+        ("elsewhere", listed(end=lambda hits: 0 * hits["end"] + 1), "name another end"),
         ("definitions", more_inertia(lambda throw, r_cm: throw.total_mass * r_cm**2), "J is about the cap instead of"),
         (
             "definitions",
