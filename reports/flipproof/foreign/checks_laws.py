@@ -31,6 +31,7 @@ from flipproof.foreign.checks_questions import STARTS
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
+from flipproof.frame.equations import CHANGES
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
@@ -255,17 +256,6 @@ def _on_grid(throw: Scenario, times: FloatArray, traits: Traits) -> Ask:
     """Return the ask for every step of a published program, which takes one from each of ``times`` to the next."""
     effort = {"steps": float(len(times) - 1), "dt": float(times[1])}.get(traits.refined_by or "")
     return Ask.of(throw, times, effort)
-
-
-CHANGES: Final[Mapping[str, str]] = {
-    "signs": "that the drag damps",
-    "roots": "the roots of Eq. 9a, omega^2 for omega^2 - gamma^2",
-    "drag_on_centre": "what the drag is measured against, C_M or the bottle",
-    "weightless": "the weight along the axis, g cos(theta)",
-    "origin": "what the drag does to the tube",
-    "recoil": "the recoil of the tube in impacts",
-}
-"""What each switch changes in an equation."""
 
 
 def check_equation(traits: Traits) -> CheckGenerator:
