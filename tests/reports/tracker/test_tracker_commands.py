@@ -86,15 +86,6 @@ def test_two_files_of_one_clip():
     assert one.values == pytest.approx(whole.values, abs=1e-4, nan_ok=True)
 
 
-def test_slow_motion_is_mended_by_the_frame_rate(tmp_path):
-    lines = (EXAMPLES / "tab.txt").read_text(encoding="utf-8").splitlines()
-    cells = [line.split("\t") for line in lines[3:]]
-    slow = lines[:3] + ["\t".join([f"{8 * float(row[0]):.6f}", *row[1:]]) for row in cells]
-    (tmp_path / "slow.txt").write_text("\n".join(slow) + "\n", encoding="utf-8")
-    one = read_film([tmp_path / "slow.txt"], cap="cap", base="base", length_unit="m", frame_rate=240.0)
-    assert np.diff(one.t) == pytest.approx(1 / 240, rel=1e-3, abs=0.0)
-
-
 def exported(tmp_path, *arguments):
     path = tmp_path / "flight.txt"
     throw = tmp_path / "throw.toml"

@@ -49,9 +49,6 @@ def test_encodings(reading, encoding, words):
     table = reading(TABS.replace("cap", "capuchon bleuté θ").encode(encoding))
     assert table.dialects[0].startswith(f"{words}, ")
     assert same(table.track("capuchon bleuté θ").columns["y"], [2, 6, 8])
-
-
-def test_big_endian(reading):
     assert reading(codecs.BOM_UTF16_BE + TABS.encode("utf-16-be")).tracks.keys() == {"cap", "base"}
 
 
