@@ -121,8 +121,8 @@ def command_certify(options: argparse.Namespace) -> int:
     from flipproof.foreign.badge import badge
     from flipproof.foreign.certify import certify, findings_of
     from flipproof.foreign.contract import check_equation
-    from flipproof.foreign.elsewhere import SEED
     from flipproof.foreign.files import Folder
+    from flipproof.foreign.throws import SEED
     from flipproof.output.folder import write_text
 
     if options.equation is not None:

@@ -16,6 +16,7 @@ from flipproof.foreign import checks_answers, checks_laws, checks_measured, chec
 from flipproof.foreign.checking import Check, NotApplicableError, Observation, drive
 from flipproof.foreign.contract import Answer, Ask, ForeignError, LateError, Runner, Traits, WaitingError
 from flipproof.foreign.late import until_when
+from flipproof.foreign.throws import SEED
 from flipproof.frame.columns import json_ready
 from flipproof.frame.findings import Finding, observed, regression
 from flipproof.frame.provenance import version_of
@@ -240,7 +241,7 @@ def certify(
     checks: Iterable[str] = tuple(CHECKS),
     *,
     equation: str | None = None,
-    seed: int = elsewhere.SEED,
+    seed: int = SEED,
     until_failed: bool = False,
     say: Callable[[Result], object] = lambda _: None,
 ) -> Certificate:

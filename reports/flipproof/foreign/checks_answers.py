@@ -27,9 +27,11 @@ from flipproof.foreign.checking import (
     time_of_max,
     whole_turns,
 )
+from flipproof.foreign.comparison import TextGenerator
 from flipproof.foreign.contract import IMPACT, Answer, Ask, ForeignError, Traits
 from flipproof.foreign.departures import UNEXPLAINED, departing
 from flipproof.foreign.place import switches_of
+from flipproof.foreign.throws import PIECES, far_from_ends
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass, moment_of_inertia
 from slicemodel.schemes import SCHEMES
@@ -300,7 +302,7 @@ def _rebound_advice(hits: Impacts) -> str:
     return f"{' and '.join(wrong)}: look at the rebound, and at what is answered of it" if wrong else ""
 
 
-def _departure_advice(traits: Traits, otherwise: str) -> elsewhere.TextGenerator:
+def _departure_advice(traits: Traits, otherwise: str) -> TextGenerator:
     """Return where a solver departs from its equation between two outputs, and by what, if that is known.
 
     If it departs nowhere return ``otherwise``.
@@ -308,7 +310,7 @@ def _departure_advice(traits: Traits, otherwise: str) -> elsewhere.TextGenerator
     if traits.equation is None or traits.equation in SCHEMES:
         return ""
     try:
-        where, advice = yield from departing(traits, traits.equation, [knobs.ask(0) for knobs in elsewhere.PIECES])
+        where, advice = yield from departing(traits, traits.equation, [knobs.ask(0) for knobs in PIECES])
     except (NotApplicableError, ForeignError):
         return ""
     if not where:
@@ -432,7 +434,7 @@ def _beyond_advice(answer: Answer, wrong: NDArray[np.bool_]) -> str:
     )
 
 
-def _drift_advice(traits: Traits, answer: Answer, name: str, bound: float) -> elsewhere.TextGenerator:
+def _drift_advice(traits: Traits, answer: Answer, name: str, bound: float) -> TextGenerator:
     """Return what may drive r_cm or J off what follows from r: impacts, or a force that a throw without it lacks."""
     assert answer.r is not None
     first = int(np.argmax(_defined(answer)[1][name] > bound))
@@ -444,7 +446,7 @@ def _drift_advice(traits: Traits, answer: Answer, name: str, bound: float) -> el
     if struck:
         look_at = "what an impact does to the bottle, and at slices that come to rest or that the recoil lifts off"
     else:
-        ask, inside = ask_of(traits, THROW), elsewhere.far_from_ends(THROW)
+        ask, inside = ask_of(traits, THROW), far_from_ends(THROW)
         rows = slice(max(first, int(np.searchsorted(ask.times, SMOOTH.duration))) + 1)  # before slices may strike
         answers = yield [replace(ask, scenario=replace(THROW, drag=0.0)), replace(ask, start=inside)]
         without_drag, without_rest = (np.all(_defined(each)[1][name][rows] <= bound) for each in answers)

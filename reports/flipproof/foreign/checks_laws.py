@@ -31,6 +31,7 @@ from flipproof.foreign.checks_questions import STARTS
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
+from flipproof.foreign.throws import far_from_ends
 from flipproof.frame.equations import CHANGES
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
@@ -54,7 +55,7 @@ def check_momentum(traits: Traits) -> CheckGenerator:
     holds, advice, located = sizes[0] <= LOCATED * bound or falls, "", ""
     if not holds:
         simpler = [ask_of(traits, throw) for throw in SIMPLER.values()]
-        simpler += [replace(ask_of(traits, replace(THROW, restitution=1.0)), start=elsewhere.far_from_ends(THROW))]
+        simpler += [replace(ask_of(traits, replace(THROW, restitution=1.0)), start=far_from_ends(THROW))]
         *drifts, restless = [float(drift(*pair).max()) for pair in zip(simpler, (yield simpler), strict=True)]
         room = max(bound, 0.03 * sizes[0])
         advice = _right_without(drifts, room)

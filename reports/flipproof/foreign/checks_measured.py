@@ -25,6 +25,7 @@ from flipproof.foreign.checking import (
 )
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.place import curve, name_of, placing, switches_of
+from flipproof.foreign.throws import PIECES, RESTLESS, far_from_ends
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
 
@@ -275,7 +276,7 @@ def _changes_before(
     ``uneven`` other times are asked, too, 0.4 and 0.8 of a step apart; ``inside`` lets all slices go far from the ends.
     """
     changes: dict[str, list[list[float]]] = {}
-    start = elsewhere.far_from_ends(throw) if inside else throw.initial_positions()
+    start = far_from_ends(throw) if inside else throw.initial_positions()
     for common in throw.duration * np.array(fractions):
         asks = [replace(ask_of(traits, throw, level), times=common, start=start) for level in levels]
         if uneven:
@@ -403,7 +404,7 @@ def _singles(answer: Answer) -> list[str]:
 
 # ---------------------------------------------------------------------- from output to output
 
-CROWDED: Final = replace(elsewhere.RESTLESS, slices=20)
+CROWDED: Final = replace(RESTLESS, slices=20)
 """A throw of many slices, of which several strike in one long step."""
 
 
@@ -416,7 +417,7 @@ def check_piecewise(traits: Traits) -> CheckGenerator:
         raise NotApplicableError("told by the check of the equation")
     if traits.equation is None and not place.on_lattice:
         raise NotApplicableError("no equation is declared")
-    asks = [knobs.ask(0) for knobs in elsewhere.PIECES]
+    asks = [knobs.ask(0) for knobs in PIECES]
     departure, advice = yield from departures.departing(traits, declared, asks, [CROWDED.ask(0)])
     return Observation(
         holds=not departure,

@@ -20,8 +20,10 @@ from flipproof.foreign.checking import (
     time_of_max,
     whole_turns,
 )
+from flipproof.foreign.comparison import TextGenerator
 from flipproof.foreign.contract import Answer, Ask, Traits
 from flipproof.foreign.place import curve, name_of, switches_of
+from flipproof.foreign.throws import far_from_ends
 from slicemodel.observables import moment_of_inertia
 from slicemodel.trajectory import FloatArray
 
@@ -98,7 +100,7 @@ def check_start(traits: Traits) -> CheckGenerator:
     if worst in initial and abs(initial[worst][1][0] + initial[worst][0]) <= bound * max(1.0, abs(initial[worst][0])):
         hint = f"{worst}(0) is {initial[worst][1][0]:.3g}, of the other sign: take {worst}_0 with its sign"
     elif worst == "omega" and not (errors[worst] <= bound or cached or from_slope):
-        (inside,) = yield [replace(ask, start=elsewhere.far_from_ends(throw))]
+        (inside,) = yield [replace(ask, start=far_from_ends(throw))]
         if abs(inside.omega[0] / throw.omega0 - 1.0) <= bound:
             hint = "right from a start far from the ends: look at the places of the ends, h/2N and L - h/2N"
         elif not hint:
@@ -281,7 +283,7 @@ def check_times(traits: Traits) -> CheckGenerator:
     )
 
 
-def _outputs_advice(traits: Traits, sparse: Answer, dense_omega: FloatArray) -> elsewhere.TextGenerator:
+def _outputs_advice(traits: Traits, sparse: Answer, dense_omega: FloatArray) -> TextGenerator:
     """Return what to look at if omega is right at dense output times or without weight or drag, and else wrong."""
     try:
         equation = name_of(switches_of(traits.equation or ""))

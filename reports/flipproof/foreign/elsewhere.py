@@ -1,152 +1,50 @@
-"""Throws that differ from those of the other checks in everything at once, and what a solver gets wrong there.
+"""What a solver gets wrong on throws that differ from those of the other checks in everything at once.
 
-A throw is a set of ``Knobs``: bottle, filling, slices, start, spin, weight, drag, restitution, output times. ``drawn``
-draws them by a seed, so that no solver is tuned to them. Each answer is compared with the exact solution of its
-equation in every field that it gives:
-
-    abs(answer - reference) <= room(t) = FLOOR + OWN x own error(t) + BAND x band(t)
-
-own error   change of the answer under refinement; it grows with the flight, so its running maximum counts
-band        change of the reference with a release that differs by 1e-6 and with another rest speed: no solver's fault
-
-Where the room exceeds ``BLURRED`` nothing is compared. If a throw is wrong, each knob is turned alone, from the
-paper's throw or back to it, until one of them separates right from wrong.
+If a throw is wrong, each knob is turned alone, from the paper's throw or back to it, until one of them separates right
+from wrong.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import combinations, cycle
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-import ode_reference
-from flipproof.foreign.checking import (
-    THROW,
-    CheckGenerator,
-    NotApplicableError,
-    Observation,
-    effort_of,
-    rest_speed_of,
-    scales,
+from flipproof.foreign.checking import CheckGenerator, NotApplicableError, Observation
+from flipproof.foreign.comparison import (
+    AT_ONCE,
+    FAINT,
+    OWN,
+    WEAK,
+    Comparison,
+    ComparisonsGenerator,
+    TextGenerator,
+    compare,
+    comparing,
+    confirmed,
 )
-from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
+from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
 from flipproof.foreign.departures import UNEXPLAINED, departing
 from flipproof.foreign.place import name_of, placing, switches_of
-from ode_reference.solver import usual_rest_speed
-from ode_reference.switches import Switches
-from slicemodel import Bottle, Scenario, Trajectory
-from slicemodel.trajectory import BASE, CAP, NO_IMPACTS, FloatArray, Impacts
-
-SEED: Final = 26
-"""Seed of the throws where none is named."""
-
-FLOOR: Final = 1e-4
-"""Room of every field, a fraction of its scale (``scales``)."""
-
-OWN: Final = 5.0
-BAND: Final = 2.0
-BLURRED: Final = 0.1
-"""Room of omega, fraction of omega_0, above which a throw tells nothing."""
-
-WEAK: Final = 0.01
-"""Own error of omega, fraction of omega_0, above which it hides what the check is looking for."""
-
-STRAY: Final = 0.03
-"""Fraction of the values of v that may be off: v jumps at an impact, and an output time may lie close to it."""
-
-LEVELS: Final = ((-1.3, -1.9, -2.6), (1, 0.4, -0.3), (3, 2.4, 1.7))
-"""Levels of refinement, finer ones where coarser ones leave an own error that matters, or hide it.
-
-No step is a multiple of another, so that no two share output times by chance.
-"""
-
-FINER: Final = tuple(level + 2 for level in LEVELS[-1])
-"""Levels at which the errors of a weak solver, or one of order 1, are confirmed: a quarter of the finest steps."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Knobs:
-    """The parameters of a throw; SI units, ``damping`` is alpha / m [1/s], ``angle`` is abs(omega_0) T [rad]."""
-
-    mass: float = THROW.bottle.mass
-    length: float = THROW.bottle.length
-    radius: float = THROW.bottle.radius
-    capacity: float = THROW.bottle.capacity
-    filling: float = THROW.fill_fraction
-    slices: int = THROW.n_slices
-    start: str = "stacked"
-    restitution: float = THROW.restitution
-    damping: float = 2 * THROW.damping_rate
-    gravity: float = THROW.gravity
-    theta0: float = THROW.theta0
-    omega0: float = THROW.omega0
-    angle: float = THROW.omega0 * THROW.duration
-    times: str = "even from 0"
-    velocity: tuple[float, float] = THROW.launch_velocity
-    frozen: bool = False
-
-    def ask(self, seed: int) -> Ask:
-        """Return the ask, without effort; ``seed`` scatters slices and times."""
-        water = self.filling * self.capacity
-        bottle = Bottle(mass=self.mass, length=self.length, radius=self.radius, capacity=self.capacity)
-        throw = Scenario(
-            bottle=bottle,
-            water_mass=water,
-            n_slices=self.slices,
-            drag=self.damping * water / self.slices,
-            restitution=self.restitution,
-            omega0=self.omega0,
-            theta0=self.theta0,
-            duration=self.angle / abs(self.omega0),
-            gravity=self.gravity,
-            launch_velocity=self.velocity,
-            frozen=self.frozen,
-        )
-        rng, start = np.random.default_rng(seed), throw.initial_positions()
-        if self.start == "permuted":
-            start = np.roll(rng.permutation(start), 1) if self.slices > 2 else start[::-1].copy()
-        elif self.start == "scattered" and self.slices == 1:
-            start = np.array([throw.r_min + 0.3 * (throw.r_max - throw.r_min)])  # no force acts on it in the middle
-        elif self.start == "stacked on the cap":
-            start = throw.r_min + throw.r_max - start
-        elif self.start == "in the middle":
-            start = far_from_ends(throw)
-        elif self.start != "stacked":
-            start = rng.uniform(throw.r_min, throw.r_max, self.slices)
-            if self.start == "partly on the ends":
-                start[::3], start[1::3] = throw.r_max, throw.r_min
-                start = rng.permutation(start)
-        end, times = throw.duration, np.linspace(0.0, throw.duration, 61)
-        if self.times == "at the end alone":
-            times = times[-1:]
-        elif self.times == "at three times":
-            times = np.array([0.4, 0.41, 1.0]) * end
-        elif self.times == "uneven from 10 ms":
-            first = min(0.01, end / 20)
-            times = np.concatenate([[first], np.sort(rng.uniform(first, end, 58)), [end]])
-        elif self.times == "uneven and ended early":
-            times = np.concatenate([[0.0], np.sort(rng.uniform(0.0, 0.7 * end, 58)), [0.7 * end, 0.70001 * end]])
-        for array in (start, times):
-            array.setflags(write=False)
-        return Ask(scenario=throw, times=times, start=start)
-
-
-def far_from_ends(throw: Scenario) -> FloatArray:
-    """Return places off the centre and far from the ends, shape (N,) [m], the first slice nearest to the base."""
-    return np.linspace(0.6, 0.3, throw.n_slices) * throw.bottle.length
-
-
-PAPER: Final = Knobs()
-
-WHOLE: Final = Knobs(damping=8.0, filling=0.45)
-"""A throw with weight, drag, and impacts on both ends."""
+from flipproof.foreign.throws import (
+    FEW_IMPACTS,
+    FULL,
+    NARROW,
+    PAPER,
+    RESTLESS,
+    SEED,
+    SLOW,
+    SMALL,
+    STICKY,
+    WHOLE,
+    Knobs,
+    drawn,
+    shortened,
+)
 
 UNREFINED: Final = 0.003
 """Own error, fraction of omega_0, granted on ``WHOLE`` to a solver that cannot be refined."""
@@ -182,52 +80,6 @@ def knob_text(knobs: Knobs, name: str) -> str:
     return WORDS[name][0].format(getattr(knobs, name))
 
 
-FACTORS: Final[Mapping[str, tuple[Any, ...]]] = MappingProxyType(
-    {
-        "slices": ((1, 2), (3, 5, 6), (9, 13, 17), (35, 70)),
-        "way": (1, -1),
-        "spin": (4.0, 12.0, 40.0),
-        "times": ("uneven from 10 ms", "even from 0", "uneven and ended early", ("at the end alone", "at three times")),
-        "damping": (0.0, 0.15, 2.5),
-        "restitution": (0.0, 0.3, 0.8, 1.0),
-        "start": ("stacked", "permuted", "scattered", "partly on the ends"),
-        "pull": (0.0, 0.3, 3.0),
-        "theta0": (0.0, 0.7, 7.0, -5.0),
-        "filling": (0.05, 0.4, 0.8, 1.0),
-        "ratio": (0.05, 0.3, 1.5),
-        "angle": (4.0, 7.0, 13.0),
-    }
-)
-"""The factors that are varied, and their levels: ``damping`` as a fraction of omega_0, ``pull`` the weight as a
-fraction of the largest centrifugal force, omega_0^2 L / 2, ``ratio`` the bottle's mass over that of the water: at any
-spin drag holds slices, and weight lifts them, in some throws. Values in brackets are one level and take turns."""
-
-FULL: Final = replace(PAPER, mass=0.05, filling=1.0, damping=0.0, gravity=0.0, theta0=0.7, omega0=-12.0, angle=4.0)
-"""A light full bottle: of its four slices two rest on the ends, and two strike both ends at one instant.
-
-Where the tube recoils, rounding decides whether a solver applies these hits together or in turn: neither is wrong.
-"""
-
-SMALL: Final = replace(
-    PAPER,
-    mass=1e-4,
-    length=0.008,
-    radius=0.003,
-    capacity=2e-4,
-    filling=0.3,
-    slices=9,
-    start="permuted",
-    omega0=-40.0,
-    gravity=2.0,
-)
-"""A bottle of 8 mm with slices of 0.3 mm: shows a cut-off of lengths, masses or drag coefficients."""
-
-SLOW: Final = replace(PAPER, slices=5, start="scattered", omega0=0.45, gravity=0.005, damping=0.05, angle=6.0)
-"""A bottle that turns once in 14 s: shows a cut-off of spins, accelerations or durations."""
-
-NARROW: Final = replace(PAPER, mass=0.5, length=0.14, filling=0.996, slices=1, start="scattered")
-"""A single slice with half a millimetre of room: water that is taken for ice if it has little room shows here."""
-
 NO_SCALE: Final = "the equation has no scale of its own: look for a constant in "
 
 SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
@@ -250,369 +102,6 @@ SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
     }
 )
 """Throws that differ from one of these in its scale or room alone: how wrong is told from right, and the advice."""
-
-COUNT: Final = 16
-"""Throws of a seed: they hold every level, and eight of nine pairs of levels of two factors."""
-
-
-def designed(rng: np.random.Generator) -> list[list[int]]:
-    """Return the levels of ``COUNT`` throws, one index per factor: each is the one of 100 with the most new pairs."""
-    sizes, covered, rows = [len(levels) for levels in FACTORS.values()], set[tuple[int, ...]](), []
-    for _ in range(COUNT):
-        candidates = [
-            ({(i, j, row[i], row[j]) for i, j in combinations(range(len(sizes)), 2)} - covered, row)
-            for row in rng.integers(0, sizes, (100, len(sizes))).tolist()
-        ]
-        new, row = max(candidates, key=lambda candidate: len(candidate[0]))
-        covered |= new
-        rows.append(row)
-    return rows
-
-
-@lru_cache(maxsize=8)
-def drawn(seed: int) -> tuple[Knobs, ...]:
-    """Return the throws of a seed: a small covering design, its values perturbed by some percent."""
-    rng = np.random.default_rng(seed)
-    throws = []
-    turns = {
-        level: cycle(rng.permutation(level).tolist())
-        for levels in FACTORS.values()
-        for level in levels
-        if isinstance(level, tuple)
-    }
-    for row in designed(rng):
-        values = {name: levels[level] for (name, levels), level in zip(FACTORS.items(), row, strict=True)}
-        values |= {name: next(turns[level]) for name, level in values.items() if level in turns}
-        factors = dict(zip(FACTORS, (1 + 0.08 * rng.uniform(-1, 1, len(FACTORS))).tolist(), strict=True))
-        slices = values["slices"] + (int(rng.integers(0, 5)) if values["slices"] > 30 else 0)
-        # A single slice hardly moves in a light bottle or against strong drag, and not at all in a full one; many in
-        # little water hit the base at once.
-        single = slices == 1
-        length, radius = rng.uniform(0.1, 0.6), rng.uniform(0.02, 0.1)
-        fluid = float(rng.choice([700.0, 1000.0, 1000.0, 13_500.0]) * rng.uniform(0.92, 1.08))  # [kg/m^3]
-        capacity = fluid * np.pi * radius**2 * length
-        filling = min(
-            max(values["filling"], 0.4 if slices > 30 else 0.0) * factors["filling"], 1.0 if slices > 2 else 0.8
-        )
-        omega0 = values["way"] * values["spin"] * factors["spin"]
-        throws.append(
-            Knobs(
-                mass=max(values["ratio"], 1.5 if single else 0.0) * filling * capacity,
-                length=length,
-                radius=radius,
-                capacity=capacity,
-                filling=filling,
-                slices=slices,
-                # The stack of a full bottle is its own mirror image: rounding decides which of two impacts comes first.
-                start=values["start"] if slices > 2 and filling < 1.0 else "scattered",
-                restitution=values["restitution"] * (factors["restitution"] if values["restitution"] < 1.0 else 1.0),
-                damping=min(values["damping"], 0.15 if single else 2.5) * factors["damping"] * abs(omega0),
-                gravity=values["pull"] * factors["pull"] * omega0**2 * length / 2,
-                theta0=values["theta0"] * factors["theta0"],
-                omega0=omega0,
-                angle=values["angle"] * factors["angle"],
-                times=values["times"],
-                velocity=tuple(rng.uniform(-3.0, 3.0, 2).round(2).tolist()),
-            )
-        )
-    throws = [_shortened(knobs, seed, MAX_IMPACTS) for knobs in throws]
-    return (*throws, *(replace(knobs, frozen=True) for knobs in throws))
-
-
-MAX_IMPACTS: Final = 100
-"""Impacts of a throw beyond one per slice: more, if elastic or in a light bottle, tell nothing new and take long."""
-
-FEW_IMPACTS: Final = 20
-"""The same if one knob is turned: after many impacts a right solver's own error matters, too."""
-
-
-def _shortened(knobs: Knobs, seed: int, impacts_left: int) -> Knobs:
-    """Return the throw, ended after ``impacts_left`` impacts plus one per slice, by Eq. 8 and in free flight."""
-    whole = replace(knobs, times="at the end alone").ask(seed)
-    share = 1.0
-    for model in ("eq8", "free-flight"):
-        impacts = ode_reference.solve(started(whole), model, whole.times).impacts
-        allowed = impacts_left + knobs.slices
-        if impacts is not None and len(impacts.time) > allowed:
-            share = min(share, 0.99 * float(impacts.time[allowed]) / whole.scenario.duration)
-    return replace(knobs, angle=share * knobs.angle)
-
-
-# ---------------------------------------------------------------------- the reference
-
-
-@lru_cache(maxsize=256)
-def _reference_flight(switches: Switches, throw: Scenario, times: bytes, rest_speed: float) -> Trajectory:
-    return ode_reference.solve(throw, switches, np.frombuffer(times), rest_speed=rest_speed)
-
-
-def references(equation: str, ask: Ask) -> list[Trajectory]:
-    """Return the exact flight of an equation from the ask's start, and twins in release and in rest speed.
-
-    A solver's rest speed is its own affair: with recoil it may be a fixed one or a fraction of the speeds of the throw.
-    """
-    switches = switches_of(equation)
-    throw, times = started(ask), ask.times.tobytes()
-    bottle = replace(throw.bottle, mass=throw.bottle.mass * (1 + 1e-6))
-    perturbed = replace(throw, bottle=bottle, omega0=throw.omega0 * (1 + 1e-6))
-    fixed, other = rest_speed_of(switches), usual_rest_speed(switches, throw) / 10 if switches.recoil else 1e-3
-    return [
-        _reference_flight(switches, throw, times, fixed),
-        _reference_flight(switches, perturbed, times, fixed),
-        _reference_flight(switches, throw, times, other),
-    ]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
-    """What is wrong on one throw: field -> (difference, room, time), fractions of its scale.
-
-    ``own_error`` is the solver's own error of omega where it was compared, ``largest`` the largest difference of omega,
-    ``share`` the share of output times that were compared. ``error`` says why there is no answer, ``onset`` after which
-    impact it goes wrong, ``impacts_passed`` how many it gets right before, ``listed`` what is wrong with its impacts.
-    """
-
-    wrong: Mapping[str, tuple[float, float, float]]
-    own_error: float = 0.0
-    largest: float = 0.0
-    share: float = 1.0
-    error: str = ""
-    onset: str = ""
-    impacts_passed: int = 0
-    listed: str = ""
-
-    @property
-    def largest_wrong(self) -> float:
-        """The largest difference of the wrong fields, 0 if none is wrong."""
-        return max((difference for difference, _, _ in self.wrong.values()), default=0.0)
-
-    @property
-    def excess(self) -> float:
-        """The largest difference over its room."""
-        return max((difference / room for difference, room, _ in self.wrong.values()), default=0.0)
-
-
-def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, unrefined: float) -> Comparison:
-    """Compare the answer to one throw; ``answers`` holds the finest, then coarser ones if the solver can be refined."""
-    truth, *twins = references(equation, ask)
-    scale = scales(ask.scenario, truth.inertia)
-    reached = min(len(run.t) for run in (truth, *twins))
-
-    def sizes(flight: Any, other: Any, name: str) -> FloatArray:
-        difference = np.abs(getattr(flight, name)[:reached] - getattr(other, name)[:reached]) / scale[name]
-        return np.asarray(difference)
-
-    def grown(values: FloatArray) -> FloatArray:
-        return np.maximum.accumulate(values if values.ndim == 1 else values.max(axis=1))
-
-    finest = answers[0]
-    floor = max(FLOOR, 1024 * traits.epsilon)
-    names = [name for name in scale if getattr(finest, name) is not None]
-    rooms: dict[str, FloatArray] = {}
-    own_errors: dict[str, FloatArray] = {}
-    for name in names:
-        summarize = grown if name != "v" else lambda x: np.full(reached, np.quantile(x, 1 - STRAY))
-        own_error = np.max(
-            [np.zeros(reached), *(summarize(sizes(finest, coarser, name)) for coarser in answers[1:])], axis=0
-        )
-        own_errors[name] = own_error if len(answers) > 1 else np.full(reached, unrefined)
-        rooms[name] = floor + OWN * own_errors[name] + BAND * sum(summarize(sizes(truth, twin, name)) for twin in twins)
-    clear = rooms["omega"] <= BLURRED
-    wrong: dict[str, tuple[float, float, float]] = {}
-    first_wrong = float(ask.times[-1])
-    for name in names:
-        errors = sizes(finest, truth, name)[clear]
-        room = rooms[name][clear]
-        if not errors.size:
-            continue
-        if name == "v":
-            beyond = errors > 10 * room[:, None]
-            if np.count_nonzero(beyond) <= max(2, STRAY * errors.size):
-                continue
-        rows = errors if errors.ndim == 1 else errors.max(axis=1)
-        k = int(np.argmax(rows / room))
-        if not rows[k] <= room[k]:
-            wrong[name] = float(rows[k]), float(room[k]), float(ask.times[k])
-            row = int(np.argmax(rows > room))
-            first_wrong = min(first_wrong, float(ask.times[:reached][clear][row]))
-    impacts_passed, onset = _onset(ask, truth.impacts or NO_IMPACTS, first_wrong) if wrong else (0, "")
-    listed = ""
-    if finest.impacts is not None and clear.any():
-        room_of_r = rooms.get("r", rooms["omega"])[clear]
-        by_rest_speed = [
-            _unmatched(ask, finest.impacts, run.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear])
-            for run in (truth, twins[-1])
-        ]
-        unmatched = [miss for miss in by_rest_speed if miss is not None]
-        if len(unmatched) == len(by_rest_speed):
-            wrong["impacts"] = unmatched[0]
-            listed = _listed_wrongly(ask, finest.impacts, truth.impacts or NO_IMPACTS)
-    return Comparison(
-        wrong=wrong,
-        own_error=float(np.max(own_errors["omega"][clear])) if clear.any() else float(own_errors["omega"].min()),
-        largest=float(np.max(sizes(finest, truth, "omega")[clear], initial=0.0)),
-        share=float(np.mean(clear)) * reached / len(ask.times),
-        onset=onset,
-        impacts_passed=impacts_passed,
-        listed=listed,
-    )
-
-
-def _onset(ask: Ask, impacts: Impacts, first_wrong: float) -> tuple[int, str]:
-    """Return how many impacts are right before the first wrong time [s], and after which it goes wrong, as a phrase."""
-    last_right = np.max(ask.times[ask.times < first_wrong], initial=0.0)
-    count = int(np.sum(impacts.time <= last_right))
-    between = np.flatnonzero((impacts.time > last_right) & (impacts.time < first_wrong))
-    if not between.size:
-        return count, f"after {count} impacts that were right" if count else "before the first impact"
-    k = int(between[0])
-    together = between[np.abs(impacts.time[between] - impacts.time[k]) < 1e-9 * ask.scenario.duration]
-    ends = {"base" if end > 0 else "cap" for end in impacts.end[together].tolist()}
-    struck = f"slice {impacts.slice[k]} on the {ends.pop()}"
-    if len(together) > 1:
-        struck = f"slices {', '.join(map(str, impacts.slice[together].tolist()))} {AT_ONCE}"
-    so_far = f"{count} impacts that were right, " if count else ""
-    return count, f"after {so_far}the impact of {struck} at {impacts.time[k]:.3g} s"
-
-
-AT_ONCE: Final = "at one instant"
-
-
-FAINT: Final = 0.02
-"""Speed, fraction of L omega_0, below which an impact need not be answered: a slice may rest there."""
-
-
-def _unmatched(
-    ask: Ask, answered: Impacts, truth: Impacts, room_of_r: FloatArray, times: FloatArray
-) -> tuple[float, float, float] | None:
-    """Return difference, room and time of the impact that most exceeds its room from any in the other list.
-
-    Impacts of one slice on one end are matched by time and number, up to the last of ``times``; a slice that is off by
-    ``room_of_r`` is late by that over its speed. Fractions of the flight; None if every impact has its match.
-    """
-    throw, misses = ask.scenario, []
-    faint = FAINT * throw.bottle.length * abs(throw.omega0)
-    for listed, counterpart in ((answered, truth), (truth, answered)):
-        for k in np.flatnonzero(listed.speed_before > faint):
-            time, row = listed.time[k], int(np.searchsorted(times, listed.time[k]))
-            if row == len(times):
-                continue
-            delay = float(room_of_r[row]) * throw.bottle.length / listed.speed_before[k]
-            room = FLOOR + delay / throw.duration
-            # Faint ones near it need not be answered, either.
-            own_distances, distances = (
-                np.sort(
-                    np.abs(hits.time[(hits.slice == listed.slice[k]) & (hits.end == listed.end[k]) & counted] - time)
-                )
-                / throw.duration
-                for hits, counted in ((listed, listed.speed_before > faint), (counterpart, True))
-            )
-            count = int(np.sum(own_distances <= room))
-            distance = float(distances[count - 1]) if count <= len(distances) else 1.0
-            if distance > 2 * room and time + 2 * room * throw.duration < times[-1]:
-                misses.append((distance, 2 * room, float(time)))
-    return max(misses, key=lambda miss: miss[0] / miss[1], default=None)
-
-
-def _listed_wrongly(ask: Ask, answered: Impacts, truth: Impacts) -> str:
-    """Return which impacts a list lacks, has besides, or gives another slice or end; empty if not clear."""
-    throw = ask.scenario
-    fast = FAINT * throw.bottle.length * abs(throw.omega0)
-    expected = np.flatnonzero((truth.speed_before > fast) & (truth.time < 0.999 * ask.times[-1]))
-    near = np.abs(answered.time[:, None] - truth.time) < 1e-3 * throw.duration
-    same = {name: getattr(answered, name)[:, None] == getattr(truth, name) for name in ("slice", "end")}
-    exact = near & same["slice"] & same["end"]
-    odd = ~exact.any(axis=1) & (answered.speed_before > fast)
-    lacking = [int(k) for k in expected if not exact[:, k].any()]
-    for name, other in (("slice", "end"), ("end", "slice")):
-        if named := [k for k in lacking if np.any(near[odd, k] & same[other][odd, k])]:
-            return f"{len(named)} of {len(expected)} name another {name}"
-    if lacking:
-        kinds = {
-            "on the cap": truth.end == CAP,
-            "on the base": truth.end == BASE,
-            **{f"of slice {k}": truth.slice == k for k in range(throw.n_slices)},
-            "after which a slice rests": truth.speed_after == 0.0,
-            "after the first": np.arange(len(truth)) > 0,
-        }
-        fits = [kind for kind, of_kind in kinds.items() if expected[of_kind[expected]].tolist() == lacking]
-        which = fits[0] if fits else f"at {times_text(truth.time[lacking])}"
-        return f"{len(lacking)} of {len(expected)} are missing, those {which}"
-    if odd.any():
-        return f"{np.sum(odd)} are listed where there is none, at {times_text(answered.time[odd])}"
-    return f"{len(answered)} are listed, {len(truth)} expected" if len(answered) != len(truth) else ""
-
-
-def times_text(times: FloatArray) -> str:
-    """Return at most three times [s] in words."""
-    return f"{', '.join(f'{time:.3g}' for time in times[:3])} s{' ...' if len(times) > 3 else ''}"
-
-
-ComparisonsGenerator = Generator[Sequence[Ask], Sequence[Answer], list[Comparison]]
-TextGenerator = Generator[Sequence[Ask], Sequence[Answer], str]
-
-
-def comparing(
-    traits: Traits,
-    throws: Sequence[Knobs],
-    seed: int,
-    equation: str,
-    unrefined: float,
-    all_levels: Sequence[Sequence[float]] = LEVELS,
-) -> ComparisonsGenerator:
-    """Ask for throws, at three levels if the solver can be refined and at finer ones if needed, and compare each.
-
-    For ice the step makes no error: one level is enough.
-    """
-    asks, comparisons = [knobs.ask(seed) for knobs in throws], {}
-    remaining = list(range(len(asks)))
-    for levels in all_levels if traits.refined_by else ((0,),):
-        asks_by_throw = {
-            k: [
-                replace(asks[k], effort=effort_of(traits, asks[k].scenario, level))
-                for level in (levels[:1] if throws[k].frozen else levels)
-            ]
-            for k in remaining
-        }
-        with suppress(ForeignError):
-            # All at once, in case somebody writes the answers by hand.
-            yield [ask for series in asks_by_throw.values() for ask in series]
-        for k, series in asks_by_throw.items():
-            try:
-                comparisons[k] = compare(
-                    traits, asks[k], (yield series), equation, 0.0 if throws[k].frozen else unrefined
-                )
-            except ForeignError as error:
-                comparisons[k] = Comparison(wrong={"answer": (1.0, 1e-3, 0.0)}, error=str(error))
-        # What fails at long steps need not fail at short ones.
-        remaining = [
-            k
-            for k in remaining
-            if comparisons[k].error
-            or OWN * comparisons[k].own_error > FLOOR
-            or (throws[k].frozen and comparisons[k].wrong)
-        ]
-    return [comparisons[k] for k in range(len(asks))]
-
-
-def confirmed(
-    traits: Traits, knobs: Knobs, comparison: Comparison, seed: int, equation: str, unrefined: float
-) -> Generator[Sequence[Ask], Sequence[Answer], Comparison]:
-    """Return the comparison of a wrong throw at the finest levels.
-
-    A step that something else limits, such as an output time or a longest step, is the same at all coarse levels: its
-    error does not show there as a change. Where impacts wait for the grid, or the order is 1, errors fall by leaps, and
-    three levels may agree by chance: a solver of order 1, or whose own error is still ``WEAK``, is asked at ``FINER``
-    ones, and compared there if it answers.
-    """
-    if traits.refined_by is None or knobs.frozen or comparison.error:
-        return comparison
-    (comparison,) = yield from comparing(traits, [knobs], seed, equation, unrefined, LEVELS[-1:])
-    if comparison.wrong and (comparison.own_error >= WEAK or (traits.order or math.inf) <= 1.0):
-        (finer,) = yield from comparing(traits, [knobs], seed, equation, unrefined, [FINER])
-        return comparison if finer.error else finer
-    return comparison
-
 
 DENSE: Final = 2000
 """Output times of a throw that is asked once more at many."""
@@ -720,7 +209,7 @@ def bisected(
             "" if knobs.frozen or fields else (yield from simpler_throws_advice(traits, equation, unrefined))
         )
         return f"{ice}{_wrong_text(base)} on the paper's throw, too", "", f"{simpler_advice}{fields}"
-    single = [_shortened(replace(paper, **{name: getattr(knobs, name)}), seed, FEW_IMPACTS) for name in names]
+    single = [shortened(replace(paper, **{name: getattr(knobs, name)}), seed, FEW_IMPACTS) for name in names]
     trials = sorted(zip(names, single, (yield from compare_all(single)), strict=True), key=lambda row: -row[2].excess)
     for name, throw, trial in trials:
         result = (yield from confirmed(traits, throw, trial, seed, equation, unrefined)) if trial.wrong else trial
@@ -787,36 +276,6 @@ LOOK_AT: Final[Mapping[str, str]] = {
 def right_without(name: str) -> str:
     """Return the advice for an answer that is right without one of ``LOOK_AT``."""
     return f"right {'before the first impact' if name == 'impacts' else f'without {name}'}: look at {LOOK_AT[name]}; "
-
-
-RESTLESS: Final = replace(WHOLE, start="scattered", restitution=1.0, damping=0.0, angle=6.0)
-"""A throw with weight and impacts on both ends in which no slice ever rests."""
-
-STICKY: Final = replace(WHOLE, restitution=0.05, omega0=8.0)
-"""A throw in which slices rest on either end, and weight releases them."""
-
-
-HELD: Final = replace(
-    PAPER,
-    slices=5,
-    start="partly on the ends",
-    restitution=0.3,
-    damping=1.0,
-    gravity=9.0,
-    omega0=8.0,
-    angle=13.0,
-)
-"""One that begins with slices on both ends, and lets them go from both."""
-
-PIECES: Final = (
-    WHOLE,
-    replace(STICKY, slices=5),
-    replace(RESTLESS, slices=5),
-    replace(WHOLE, gravity=0.0, damping=0.0, angle=5.0),
-    HELD,
-    replace(WHOLE, start="stacked on the cap"),
-)
-"""Throws with and without weight, drag, and rests on one or both ends, of an even and an odd number of slices."""
 
 
 def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNREFINED) -> TextGenerator:

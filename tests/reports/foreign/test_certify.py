@@ -24,9 +24,13 @@ from flipproof.foreign import checks_measured
 from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WEAK, certify, findings_of
 from flipproof.foreign.checking import drive
 from flipproof.foreign.checks_measured import CROWDED
+from flipproof.foreign.comparison import comparing, confirmed
 from flipproof.foreign.contract import IMPACT, Ask, ForeignError, LateError, started
 from flipproof.foreign.departures import departing
-from flipproof.foreign.elsewhere import (
+from flipproof.foreign.elsewhere import simpler_throws_advice
+from flipproof.foreign.place import name_of, switches_of
+from flipproof.foreign.solving import opened
+from flipproof.foreign.throws import (
     COUNT,
     FACTORS,
     FULL,
@@ -37,14 +41,9 @@ from flipproof.foreign.elsewhere import (
     SMALL,
     STICKY,
     WHOLE,
-    comparing,
-    confirmed,
     designed,
     drawn,
-    simpler_throws_advice,
 )
-from flipproof.foreign.place import name_of, switches_of
-from flipproof.foreign.solving import opened
 from flipproof.frame.solvers import solve
 from flipproof.output.junit import junit_text
 from flipproof.testing import parametrize_with_checks

@@ -11,7 +11,7 @@ from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
 from flipproof.foreign.checking import NotApplicableError, drive
 from flipproof.foreign.contract import ForeignError
 from flipproof.foreign.departures import departing
-from flipproof.foreign.elsewhere import STICKY, WHOLE
+from flipproof.foreign.throws import STICKY, WHOLE
 from slicemodel.observables import moment_of_inertia
 
 
