@@ -103,22 +103,26 @@ def _right_without(sizes: Sequence[float], bound: float) -> str:
 def check_mirror(traits: Traits) -> CheckGenerator:
     """A throw mirrored left to right has the mirrored flight: -theta, -omega, the same r."""
     original, mirrored = yield _mirrored(traits, THROW)
-    change = _mirror_error(original, mirrored)
+    errors = _mirror_errors(original, mirrored)
     bound = max(1e-9, 1024 * traits.epsilon)  # the launch is not mirrored, and round-off grows with every impact
-    holds, advice = float(change.max()) <= bound, ""
-    if not holds:
+    wrong = next((name for name in errors if not errors[name].max() <= bound), "")
+    advice = ""
+    if wrong == "omega":
         answers = yield [ask for throw in SIMPLER.values() for ask in _mirrored(traits, throw)]
-        sizes = [float(_mirror_error(*pair).max()) for pair in zip(answers[::2], answers[1::2], strict=True)]
-        if (mirrored.theta[1] - mirrored.theta[0]) * mirrored.omega[0] < 0.0:
-            advice = "with omega below 0 theta grows: look at the sign of omega where theta is advanced"
-        else:
-            advice = _right_without(sizes, bound) + "look for abs(omega), a sign of theta, another angle than theta in "
-            advice += "the weight, or a place that assumes omega > 0"
+        pairs = zip(answers[::2], answers[1::2], strict=True)
+        sizes = [float(_mirror_errors(*pair)["omega"].max()) for pair in pairs]
+        advice = _right_without(sizes, bound) + "look for abs(omega), a sign of theta, another angle than theta in "
+        advice += "the weight, or a place that assumes omega > 0"
+    elif wrong:
+        advice = f"omega is mirrored, {wrong} is not: look at signs where {wrong} is advanced, and between steps"
+    if wrong and (mirrored.theta[1] - mirrored.theta[0]) * mirrored.omega[0] < 0.0:
+        advice = "with omega below 0 theta grows: look at the sign of omega where theta is advanced"
+    shown = wrong or "omega"
     return Observation(
-        holds=holds,
-        expected=f"omega -> -omega within {bound:.1g} of omega_0",
-        observed=f"off by {change.max():.2g}",
-        where=time_of_max(original.t, change),
+        holds=not wrong,
+        expected=f"omega -> -omega, theta -> -theta, r -> r within {bound:.1g} of each",
+        observed=f"{shown} off by {errors[shown].max():.2g}",
+        where=time_of_max(original.t, errors[shown]),
         advice=advice,
     )
 
@@ -128,9 +132,13 @@ def _mirrored(traits: Traits, throw: Scenario) -> list[Ask]:
     return [ask_of(traits, variant) for variant in (throw, replace(throw, theta0=-throw.theta0, omega0=-throw.omega0))]
 
 
-def _mirror_error(original: Answer, mirrored: Answer) -> FloatArray:
-    """Return the difference of omega from that of the mirror image, as a fraction of omega_0."""
-    return np.asarray(np.abs(original.omega + mirrored.omega) / abs(THROW.omega0))
+def _mirror_errors(original: Answer, mirrored: Answer) -> dict[str, FloatArray]:
+    """Return the differences from the mirror image by field, as fractions of its scale, each of shape (P,)."""
+    scale = scales(THROW)
+    errors = {name: getattr(original, name) + getattr(mirrored, name) for name in ("omega", "theta")}
+    if original.r is not None and mirrored.r is not None:
+        errors["r"] = np.max(np.abs(original.r - mirrored.r), axis=1)
+    return {name: np.asarray(np.abs(error) / scale[name]) for name, error in errors.items()}
 
 
 def check_moving_frame(traits: Traits) -> CheckGenerator:

@@ -154,8 +154,17 @@ def _order_of(traits: Traits) -> float:
     return traits.order
 
 
+APART: Final = 1000.0
+"""Ratio of the changes of two fields between tolerances from which on one is not controlled.
+
+Those of right solvers are within 100.
+"""
+
+
 def check_order_before(traits: Traits) -> CheckGenerator:
-    """Before the first impact the error of every field falls with the step at the declared order, or faster."""
+    """Before the first impact every field's error falls at the declared order, or faster; with rtol, all alike."""
+    if traits.refined_by == "rtol":
+        return (yield from _changes_alike(traits))
     declared = _order_of(traits)
     # Few and long steps: at short ones an order of 4 or more drowns in round-off. Low orders show only at short ones.
     # The order is a limit for short steps: the best of the ratios counts.
@@ -259,6 +268,21 @@ FRACTIONS: Final = (
 The error of an answer between two steps depends on where it lies between them, which changes from level to level: an
 order that is too low at a few times is measured again at all of them.
 """
+
+
+def _changes_alike(traits: Traits) -> CheckGenerator:
+    """Hold the changes of the fields from one tolerance to the next against each other: rtol has no order."""
+    changes = yield from _changes_before(traits, SMOOTH, (2, 4), FRACTIONS)
+    sizes = {name: values[-1] for name, values in changes.items()}
+    least, most = (select(sizes, key=lambda name: sizes[name]) for select in (min, max))
+    floor = max(ROUNDOFF, 64 * traits.epsilon)
+    return Observation(
+        holds=sizes[most] <= APART * max(sizes[least], floor),
+        expected=f"fields that change alike, within a factor of {APART:g}",
+        observed=f"{most} by {sizes[most]:.2g}, {least} by {sizes[least]:.2g}",
+        where="0.05 s in which the equation has no impact, rtol from 1e-08 to 1e-10",
+        advice=f"look at how {most} is advanced in a step, and answered between two: rtol does not control its error",
+    )
 
 
 def _changes_before(
