@@ -45,7 +45,7 @@ from ode_reference.models import MODELS
 
 Measure = Literal["largest", "share"]
 
-NOTHING = 1e-6
+NOTHING = 1e-5
 """Fraction of omega_0 below which two solvers are said to agree."""
 
 
@@ -182,6 +182,30 @@ def answer(headlines: Sequence[Headline]) -> str:
     by_id = {headline.id: headline for headline in headlines}
     if not {"step", "eq8-free"} <= set(by_id):
         return "No verdict: what it needs could not be computed. The evidence gives the reasons."
+    return f"{_answer(by_id)}{_with_more_slices(by_id)}"
+
+
+def _with_more_slices(by_id: Mapping[str, Headline]) -> str:
+    """Return what more slices move over PARTING_BAND, either way, in a sentence; empty if nothing."""
+    words = {
+        "step": "the time step moves ω",
+        "formulas": "program and Eq. 8 part",
+        "eq8-free": "Eq. 8 and free flight part",
+    }
+    moved = [
+        (by_id[id_].finer_slices, f"{text} by up to {percent(by_id[id_].finer or 0.0)}")
+        for id_, text in words.items()
+        if id_ in by_id and crosses(by_id[id_].value, by_id[id_].finer)
+    ]
+    return f" With {moved[0][0]} slices {' and '.join(text for _, text in moved)}." if moved else ""
+
+
+def crosses(value: float, finer: float | None) -> bool:
+    """Return whether more slices move a number over PARTING_BAND, either way."""
+    return finer is not None and math.isfinite(finer) and (value <= PARTING_BAND) != (finer <= PARTING_BAND)
+
+
+def _answer(by_id: Mapping[str, Headline]) -> str:
     if not _differ(by_id):
         return f"This throw tells nothing apart: all equations agree within {small(NOTHING)} of ω₀, as for ice."
     fails = {id_: not headline.value <= PARTING_BAND for id_, headline in by_id.items()}
@@ -268,8 +292,8 @@ def _amount(headline: Headline) -> str:
 
 
 def signed(share: float) -> str:
-    """Return a fraction with its sign, two digits."""
-    return f"{'+' if share >= 0 else '−'}{percent(abs(share))}"
+    """Return a fraction with its sign, if it is not 0, two digits."""
+    return f"{'+' if share > 0 else '−' if share < 0 else ''}{percent(abs(share))}"
 
 
 def small(value: float) -> str:
@@ -384,7 +408,8 @@ def story(content: Mapping[str, Any], bottles: ValidityMap | None = None) -> Sim
         experiments={name: _experiment(summary, id_) for name, id_ in EXPERIMENTS.items()},
         nearest=_nearest(summary),
         water=_water(summary),
-        weight_first=summary.at("headlines/pair/what") == RUNG_NAMES["weightless"],
+        weight_first=summary.at("headlines/pair/what") == RUNG_NAMES["weightless"]
+        and (summary.at("headlines/pair/value") or 0.0) > NOTHING,
         map=_map(bottles),
         names=NAMES,
     )
@@ -412,12 +437,22 @@ def _layers(summary: Summary, numbers: Mapping[str, Number | None]) -> list[Simp
         if number is not None:
             beside = {"finer": percent, "finer_slices": plain, "band": small}
             more = {field: summary.number(f"headlines/{id_}/{field}", shown) for field, shown in beside.items()}
+            finer = None if more["finer"] is None else more["finer"].value
+            coarse = crosses(number.value, finer) or _apart(number.value, finer)
             layers.append(
                 SimpleNamespace(
-                    id=id_, name=name, section=section, question=question, number=number, within=number.within, **more
+                    id=id_, name=name, section=section, question=question, number=number, within=number.within,
+                    coarse=coarse, **more,
                 )
-            )
+            )  # fmt: skip
     return layers
+
+
+def _apart(value: float, finer: float | None) -> bool:
+    """Return whether more slices halve or double a number that counts."""
+    if finer is None or not max(value, finer) > PARTING_BAND:
+        return False
+    return not 0.5 * value <= finer <= 2.0 * value
 
 
 def _bars(summary: Summary) -> list[SimpleNamespace]:

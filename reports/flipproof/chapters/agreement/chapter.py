@@ -117,7 +117,7 @@ def _words(names: tuple[str, ...], pairs: list[Pair]) -> str:
     if not apart:
         min_share = min(pair.share for pair in pairs)
         times = "" if min_share == 1.0 else f" at {math.floor(100.0 * min_share)} % of the times or more"
-        return f"all agree within their bands{times}"
+        return f"{'both' if len(names) == 2 else 'all'} agree within their bands{times}"
     alone = [name for name in names if all(name in two for two in apart)]
     if len(alone) == 1:
         return f"all but {alone[0]} agree within their bands"

@@ -169,7 +169,7 @@ def figures(results: Pairs) -> Iterator[Exhibit]:
     """Yield contacts and impacts of every pair."""
     for (first, second), alignment in results_of(results).items():
         rows = len(even_rows(alignment.n_slices))
-        some = f"; of {alignment.n_slices} slices {rows} are drawn, and the numbers below count the impacts of all"
+        some = f"; of {alignment.n_slices} slices {rows} are drawn; numbers of impacts are those of all"
         yield Exhibit(
             name=f"gantt-{first}-{second}",
             title=f"Contacts and impacts: {first} and {second}",

@@ -174,7 +174,8 @@ def claims(results: Differences) -> Claims:
             yield from claim_guest(d, *results.guests[d.second])
             continue
         more = "" if d.finer is None else f"; {d.finer[1]:.3g} at N = {d.finer[0]}"
-        note = f"largest of {len(d.t)} output times, at t = {d.largest_time * 1e3:.1f} ms, N = {d.slices}{more}"
+        at = f", at t = {d.largest_time * 1e3:.1f} ms" if d.largest else ""
+        note = f"largest of {len(d.t)} output times{at}, N = {d.slices}{more}"
         id_, title = _id(d.first, d.second), f"{d.name}: {d.first} against {d.second}"
         rule: Rule = "twins and refinement" if {d.first, d.second} & set(WITNESSES) else "twins"
         yield observed(id_, title, d.largest, "of ω₀", f"{note}; {d.moment}", band=Band.of(d.band, rule))

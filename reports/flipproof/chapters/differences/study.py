@@ -15,8 +15,13 @@ PARTING_BAND = 0.01
 
 
 def percent(share: float) -> str:
-    """Return a fraction as the page prints it, two digits."""
-    return f"{100 * share:.0f} %" if abs(share) >= 0.995 else f"{100 * share:.2g} %"
+    """Return a fraction as the page prints it: two digits, more if they hide that it is above ``PARTING_BAND``."""
+    if abs(share) >= 0.995:
+        return f"{100 * share:.0f} %"
+    digits, limit = 2, f"{100 * PARTING_BAND:.2g}"
+    while abs(share) > PARTING_BAND and digits < 9 and f"{100 * abs(share):.{digits}g}" == limit:
+        digits += 1
+    return f"{100 * share:.{digits}g} %"
 
 
 def moved(value: float, finer: float, slices: int) -> str:

@@ -102,8 +102,9 @@ def figures(results: Flown) -> Iterator[Exhibit]:
         "Angular velocity",
         caption="Two pairs are a scheme and the equation that it solves, and differ by the effect of a finite time "
         "step: the published program and its limit Δt → 0, and the exact step and Eq. 8. pymunk computes free flight "
-        "by its own mechanics. Any other two curves solve different equations. All have "
-        f"N = {flights[0].scenario.n_slices} slices.",
+        "by its own mechanics. Any other two curves solve different equations, unless what tells them apart, such as "
+        "drag, is missing in this throw. All have "
+        f"N = {flights[0].scenario.n_slices}.",
         alt="Line plot of omega over omega_0 against time, 1 at release. Values at the end: {}.",
         column="omega/omega_0 {} [1]",
         unit=" of omega_0",
@@ -214,7 +215,7 @@ def figure_over_time(trajectories: Iterable[Trajectory], quantity: str) -> Figur
 def chosen_slices(trajectory: Trajectory) -> list[tuple[int, str]]:
     """Return the slices worth drawing: first, nearest the centre of mass at release, last; fewer if they coincide."""
     nearest = int(np.abs(trajectory.r[0] - trajectory.r_cm[0]).argmin())
-    words = {0: "starts on the base", trajectory.scenario.n_slices - 1: "starts on top of the water"}
+    words = {trajectory.scenario.n_slices - 1: "starts on top of the water"} | {0: "starts on the base"}
     words.setdefault(nearest, "starts nearest the centre of mass")
     return sorted(words.items())
 

@@ -174,7 +174,9 @@ def figures(result: OverlapResult) -> Iterator[Exhibit]:
         if any(study.reason[name]):
             columns[f"missing because: {name}"] = study.reason[name]
     lost = study.missing_from_ice(EXCLUDE)
-    kept = "" if np.isnan(lost) else f"In the same engine, slices that exclude each other keep {1 - lost:.1%} of it. "
+    kept = ""
+    if not np.isnan(lost):
+        kept = f"In the same engine, slices that exclude each other keep {100 * (1 - lost):.1f} % of the spin. "
     cost, max_note = study.cost_to_column, ""
     if np.isfinite(cost).any():
         k = int(np.nanargmax(np.abs(cost)))

@@ -53,8 +53,9 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
         f"{words}: {', '.join(f'{name} {share:+.3g}' for name, share in shares.items())}"
         for words, shares in waterfall.groupings.items()
     )
+    name = largest.name if largest.average else "none"
     note = (
-        f"largest fair share (mean over all orders): {largest.name}, {largest.average:+.3g} ± "
+        f"largest fair share (mean over all orders): {name}, {largest.average:+.3g} ± "
         f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
         f"N = {waterfall.slices}{finer}; the bars miss the whole by {waterfall.residual:.1g}; "
         f"in other counts of what is one change: {'; '.join(counts)}"
@@ -67,11 +68,11 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
 
 
 def claim_overlap(waterfall: Waterfall) -> Finding:
-    """From free flight, whose slices overlap, to rods, which cannot: the margin of the waterfall."""
+    """From free flight, whose slices overlap and rebound, to rods, which do neither: the margin of the waterfall."""
     finer = waterfall.finer_overlap
-    title = f"{waterfall.observable.words}: rods minus free flight, what forbidding overlap changes"
+    title = f"{waterfall.observable.words}: rods, which neither overlap nor rebound, minus free flight"
     note = f"a difference of two models, no share; free flight at N = {waterfall.slices}, "
-    note += "rods are infinitely many and do not bounce"
+    note += "rods are infinitely many"
     note += f"; {finer:+.3g} at N = {FINER * waterfall.slices}" if finer is not None else ""
     return observed("waterfall-overlap", title, waterfall.overlap, note=note, band=Band(waterfall.end_band, "twins"))
 
@@ -83,15 +84,15 @@ def figures(waterfalls: tuple[Waterfall, ...]) -> Iterator[Exhibit]:
     yield Exhibit(
         name="waterfall",
         title="From the published program to free flight",
-        caption=f"At N = {waterfall.slices} slices. Left: each bar is the fair share of one change, the mean over "
+        caption=f"At N = {waterfall.slices}. Left: each bar is the fair share of one change, the mean over "
         "all orders in which six can be made after the finite step; blue raises, orange lowers. Right: the same "
         "change in single orders. Where the marks lie apart the assumptions interact, and the bar of one order is "
         "not a share. "
-        "Error bars are numerical. Below the dotted line, hatched: what forbidding overlap changes, from free flight, "
-        "whose slices overlap, to rods of water, which cannot. That is a difference of two models and no share.",
+        "Error bars are numerical. Below the dotted line, hatched: from free flight, whose slices overlap and rebound, "
+        "to infinitely many rods of water, which do neither. That is a difference of two models and no share.",
         alt=f"Waterfall of the mean of omega over omega_0 in the second half: from {waterfall.start:.3f} to "
-        f"{waterfall.end:.3f}. Means over all orders: {bars}. The largest is {waterfall.largest.name}. "
-        f"From there to rods of water, which cannot overlap: {waterfall.overlap:+.3f}.",
+        f"{waterfall.end:.3f}. Means over all orders: {bars}. "
+        f"From there to rods of water, which neither overlap nor rebound: {waterfall.overlap:+.3f}.",
         maker=figure_waterfall,
         data=(waterfall,),
         table=bars_csv(waterfall),
@@ -121,7 +122,7 @@ def bars_csv(waterfall: Waterfall) -> str:
 def figure_waterfall(waterfall: Waterfall) -> Figure:
     """Left: the fair shares, each bar from the value before to the value after. Right: the same in single orders.
 
-    Below, hatched: what forbidding overlap changes, from free flight to rods.
+    Below, hatched: from free flight to rods, which neither overlap nor rebound.
     """
     figure, (ladder, orders) = new_figure(1, 2, size=(8.0, 4.9), sharey=True, width_ratios=(1.5, 1.0))
     names = ["published program", *(bar.name for bar in waterfall.bars), "free flight"]
@@ -149,7 +150,7 @@ def figure_waterfall(waterfall: Waterfall) -> Figure:
         axes.grid(visible=False, axis="y")
     place_of: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "fontsize": 8}
     orders.annotate("a difference of two models,\nno share", (0.02, 0), **place_of)
-    ladder.set_yticks([*places, 0], [*names, "no overlap: rods"])
+    ladder.set_yticks([*places, 0], [*names, "rods"])
     ladder.set_xlabel(f"{waterfall.observable.words} [{waterfall.observable.unit}]")
     ladder.set_title("fair shares: means over all orders", fontsize=10, loc="left")
     orders.axvline(0.0, color="#444444", linewidth=0.8)

@@ -8,7 +8,7 @@ one that changes nothing: an assumption's fair share. Each of the three sums to 
 asserted. A bar of one order, or the largest bar of any order, is no share: another order gives another number. The
 step size comes first in every order: only the program has one.
 
-In the margin stands what forbidding overlap changes: free flight still lets slices overlap, rods of water cannot
+In the margin stand rods: free flight lets slices overlap and rebound, rods of water do neither
 (``ode_reference.rods``). Rods have no switches, so that they take no part in the orders: rods minus free flight is a
 difference of two models.
 """
@@ -130,7 +130,7 @@ class Waterfall:
 
     @property
     def overlap(self) -> float:
-        """What forbidding overlap changes: rods minus free flight, no share."""
+        """Rods, which neither overlap nor rebound, minus free flight; no share."""
         return self.rods - self.end
 
     @property
@@ -140,8 +140,8 @@ class Waterfall:
 
     @property
     def largest(self) -> Bar:
-        """The bar whose average over orders is largest in size."""
-        return max(self.bars, key=lambda bar: abs(bar.average))
+        """The fair share, that is the bar of an assumption, which is largest in size."""
+        return max((bar for bar in self.bars if bar.name != STEP), key=lambda bar: abs(bar.average))
 
 
 def program_run(throw: Scenario, steps: int) -> Run:

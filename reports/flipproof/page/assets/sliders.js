@@ -60,7 +60,8 @@
     find("said").textContent = changed
       ? `With g = ${chart.shown(thrown.g, 2)} instead of ${chart.shown(start.g, 2)} m/s², ω moves by at most, as shares of ω₀: ${apart((name) => before[name]).join(", ")}.`
       : `The largest differences from free flight are, as shares of ω₀: ${apart(() => now["free-flight"]).join(", ")}.`;
-    if (high > 6) find("said").textContent += " Curves leave the chart at 6 ω₀.";
+    const leaving = plot.lines.filter(({ y }) => y.some((value) => value > 6)).length;
+    if (leaving) find("said").textContent += ` ${leaving > 1 ? `${leaving} curves leave` : "One curve leaves"} the chart at 6 ω₀.`;
     clearTimeout(doubting);
     doubting = setTimeout(doubt, 300, now["free-flight"]);
     drawn = { thrown: { ...fixed, ...thrown }, curves: now, before, milliseconds: performance.now() - began };

@@ -55,6 +55,7 @@ window.flipproofTouch = (() => {
 
     const text = (value) => {
       if (!Number.isFinite(value)) return "–";
+      if (plot.y.percent && value < 0.11 * plot.y.low) return `< ${Number((10 * plot.y.low).toPrecision(2))} %`; // the curve's floor
       return plot.y.percent ? `${Number((100 * value).toPrecision(2))} %` : chart.shown(value, plot.y.digits ?? 3);
     };
     const seen = () => plot.lines.filter((line) => !hidden.has(line.name));
