@@ -31,7 +31,7 @@ def test_those_within_their_bands_agree():
 
 def test_a_few_times_outside_are_said():
     found = matrix(0.0, np.where(np.arange(len(T)) < len(T) // 25, 1.0, 0.0))
-    assert found.words == "all agree within their bands at 96 % of the times or more"
+    assert found.words == "both agree within their bands at 96 % of the times or more"
 
 
 @pytest.mark.parametrize(("shifts", "odd"), [((1.0, 0.0, 0.0), "a"), ((0.0, 1.0, 0.0), "b"), ((0.0, 0.0, -1.0), "c")])

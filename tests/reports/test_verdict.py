@@ -18,7 +18,7 @@ from flipproof.chapters.waterfall.study import STEP
 from flipproof.cli.snapshot import BEGIN, END, PLACE, README, front_page, write_front_page
 from flipproof.frame.equations import NAMES
 from flipproof.frame.solvers import FINER
-from flipproof.page.verdict import Headline, Measure, _pairs, answer, headlines, lead, lines
+from flipproof.page.verdict import Headline, Measure, _pairs, answer, headlines, lead, lines, story
 
 INSTEAD = "For slices, use free flight; for water, half full or more, rods (slices without overlap) are the best guess."
 
@@ -217,6 +217,42 @@ def test_only_a_rung_from_eq8_to_free_flight_can_be_what_moves_eq8_most():
     pairs = tuple(SimpleNamespace(name=name, largest=size, **fields) for name, size in sizes.items())
     (pair,) = _pairs(Differences(pairs=pairs, ended="", missing={}))
     assert (pair.id, pair.what) == ("pair", "gravity in Eq. 8")
+
+
+@pytest.mark.parametrize(
+    ("value", "finer", "said"),
+    [
+        (0.0, 0.04, " With 100 slices Eq. 8 and free flight part by up to 4 %."),
+        (0.3, 0.003, "up to 0.3 %."),
+        (0.3, 0.2, ""),
+    ],
+)
+def test_more_slices_that_turn_an_answer_round_are_in_it(value, finer, said):
+    numbers = [made_up("step", 0.001, finer=0.002, finer_slices=100), made_up("whole", 0.2)]
+    words = answer([*numbers, made_up("eq8-free", value, finer=finer, finer_slices=100)])
+    assert words.endswith(said)
+    assert ("With 100 slices" in words) is bool(said)
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [(0.01, "1 %"), (0.010265, "1.03 %"), (0.0100001, "1.00001 %"), (0.0096, "0.96 %"), (-0.0101, "-1.01 %")],
+)
+def test_a_number_beyond_the_limit_is_not_printed_as_the_limit(share, words):
+    assert percent(share) == words
+
+
+def test_a_weight_that_moves_nothing_moves_nothing_most():
+    still = {"id": "pair", "what": "gravity in Eq. 8", "value": 0.0, "measure": "largest"}
+    assert not story({"headlines": [still]}).weight_first
+    assert story({"headlines": [still | {"value": 0.1}]}).weight_first
+
+
+@pytest.mark.parametrize(("finer", "coarse"), [(0.03, True), (0.2, False), (0.7, True), (None, False)])
+def test_a_card_tells_of_more_slices_where_they_halve_or_double_its_number(finer, coarse):
+    one = {"id": "eq8-free", "value": 0.3, "finer": finer, "finer_slices": 4, "measure": "largest"}
+    (layer,) = story({"headlines": [one]}).layers
+    assert layer.coarse is coarse
 
 
 def test_the_answer_needs_step_and_equation():

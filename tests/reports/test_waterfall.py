@@ -115,7 +115,14 @@ def test_overlap_stands_in_the_margin_and_takes_no_part_in_the_split():
     assert (claim.id, claim.value) == ("waterfall-overlap", pytest.approx(4.0))
     assert "no share; free flight at N = 1" in claim.note
     labels = [label.get_text() for label in figure_waterfall(plateau).axes[0].get_yticklabels()]
-    assert labels[-1] == "no overlap: rods"
+    assert labels[-1] == "rods"
+
+
+def test_the_step_is_no_fair_share():
+    plateau = split(lambda s: 1.0 if s.recoil else 0.0)[0]
+    step, *others = plateau.bars
+    bars = (dataclasses.replace(step, average=9.0), *others)
+    assert dataclasses.replace(plateau, bars=bars).largest.name == plateau.largest.name == "no recoil in impacts"
 
 
 def test_the_margin_is_that_of_direct_runs():
