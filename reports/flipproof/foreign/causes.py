@@ -14,7 +14,7 @@ from flipproof.foreign.checking import WRAPPED, whole_turns
 from flipproof.foreign.interval import FIELDS, FLOOR, Interval
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass
-from slicemodel.trajectory import FloatArray
+from slicemodel.trajectory import BASE, FloatArray
 
 OFF_MOMENTUM: Final = 1e-4
 """Departure of omega from constant angular momentum between two outputs that is no error of a step."""
@@ -65,22 +65,25 @@ def _stays(intervals: Sequence[Interval]) -> str:
     if not stays or np.mean(np.array(stays) > 0.0) < 0.6:
         return ""
     return (
-        f"the slice that strikes, at up to {max(stays):.2g} m/s, rests from then on: look at the speed below which "
-        "a slice rests"
+        f"the slice that strikes, at up to {max(stays):.2g} m/s, rests from then on: look at what brings a slice to "
+        "rest, a speed, its sign, or a number of impacts"
     )
 
 
 def _held(intervals: Sequence[Interval]) -> str:
     """Return that slices count as at rest which the equation moves, if one does in most intervals."""
-    stays, drifts = [], []
+    stays, drifts, sides = [], [], set()
     for i in intervals:
-        room = 1e-6 * i.throw.bottle.length
+        room, side = 1e-6 * i.throw.bottle.length, np.sign(i.r[0] - i.throw.bottle.length / 2)
         moved = (i.after == 0) & (np.abs(i.v[1] - i.expected["v"]) > room) & (i.v[0] == i.v[1])
         on_end = (i.r[0] < i.throw.r_min + room) | (i.r[0] > i.throw.r_max - room)
-        stays.append(np.any(moved & on_end & (i.v[1] == 0)))
+        held = moved & on_end & (i.v[1] == 0)
+        stays.append(np.any(held))
+        sides |= set(side[held].tolist())
         drifts.append(np.any(moved & (i.v[1] != 0)))
     if np.mean(stays) > 0.5:
-        return "slices stay on an end that lets them go: look at when a slice at rest is let go"
+        end = "an end that" if len(sides) > 1 else f"the {'base' if BASE in sides else 'cap'}, which"
+        return f"slices stay on {end} lets them go: look at when a slice at rest is let go"
     if np.mean(drifts) > 0.5:
         return "a slice keeps its velocity to the last digit, as if at rest: look at when a slice at rest is let go"
     return ""
@@ -363,13 +366,27 @@ def _motion_cause(samples: Sequence[Sequence[Interval]], *, seldom: bool) -> str
     if (field := _only_field(samples[0])) not in ("", "v"):
         return f"{field} alone is off"
     fits = [(intervals, *fit) for intervals in samples if (fit := _terms_of(intervals)) is not None]
-    for count, rest in ((1, EXPLAINED), (1, OF_STRONG_DRAG), (2, EXPLAINED), (3, EXPLAINED)):
-        for intervals, table, target in fits:
-            if explained := _explained(table, target, count, rest):
-                throw = intervals[0].throw
-                where = f" where N = {throw.n_slices}" if len(intervals) < len(samples[0]) else ""
-                return _motion_words(throw, *explained, where, seldom=seldom)
+    few_left_out = [(intervals, *_without_strays(table, target)) for intervals, table, target in fits]
+    for chosen in (fits, few_left_out):
+        for count, rest in ((1, EXPLAINED), (1, OF_STRONG_DRAG), (2, EXPLAINED), (3, EXPLAINED)):
+            for intervals, table, target in chosen:
+                if explained := _explained(table, target, count, rest):
+                    throw = intervals[0].throw
+                    where = f" where N = {throw.n_slices}" if len(intervals) < len(samples[0]) else ""
+                    return _motion_words(throw, *explained, where, seldom=seldom)
     return ""
+
+
+STRAYS: Final = 0.05
+"""Share of accelerations that may be left out: a slice that is let go at another instant has one of another kind."""
+
+
+def _without_strays(table: Mapping[str, FloatArray], target: FloatArray) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Return terms and accelerations without the largest, if few are far larger than most."""
+    kept = np.abs(target) <= 6.0 * np.median(np.abs(target))
+    if np.mean(kept) < 1.0 - STRAYS:
+        return dict(table), target
+    return {name: values[kept] for name, values in table.items()}, target[kept]
 
 
 def _terms_of(intervals: Sequence[Interval]) -> tuple[dict[str, FloatArray], FloatArray] | None:
@@ -458,6 +475,9 @@ def _motion_words(throw: Scenario, names: tuple[str, ...], factors: FloatArray, 
         )
     if names == (WEIGHT_OF_ITS_OWN,) and factor > 0.0:
         return f"slices weigh as if g were {factor:.3g} m/s^2 where it is 0: take gravity from the throw"
+    weight = throw.gravity * (1.0 + factor)
+    if names == ("g cos(theta)",) and abs(weight - 9.81) < 0.02:
+        return f"slices weigh as if g were 9.81 m/s^2 where it is {throw.gravity:.3g}: look at where gravity comes from"
     parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(names, factors, strict=True))
     return f"its slices accelerate by {parts} besides{where}"
 

@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 import ode_reference
-from flipproof.foreign.checking import effort_of, rest_speed_of, scales
+from flipproof.foreign.checking import effort_of, rest_speed_of, scales, whole_turns
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, started
 from flipproof.foreign.place import switches_of
 from flipproof.foreign.throws import Knobs
@@ -81,7 +81,8 @@ class Comparison:
 
     ``own_error`` is the solver's own error of omega where it was compared, ``largest`` the largest difference of omega,
     ``share`` the share of output times that were compared. ``error`` says why there is no answer, ``onset`` after which
-    impact it goes wrong, ``impacts_passed`` how many it gets right before, ``listed`` what is wrong with its impacts.
+    impact it goes wrong, ``impacts_passed`` how many it gets right before, ``listed`` what is wrong with its impacts,
+    ``whole_turns`` whether theta is off by whole turns.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
@@ -92,6 +93,7 @@ class Comparison:
     onset: str = ""
     impacts_passed: int = 0
     listed: str = ""
+    whole_turns: bool = False
 
     @property
     def largest_wrong(self) -> float:
@@ -167,6 +169,7 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
         onset=onset,
         impacts_passed=impacts_passed,
         listed=listed,
+        whole_turns="theta" in wrong and whole_turns((finest.theta[:reached] - truth.theta[:reached])[clear], 1e-3),
     )
 
 

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.foreign.checking import CheckGenerator, NotApplicableError, Observation
+from flipproof.foreign.checking import WRAPPED, CheckGenerator, NotApplicableError, Observation
 from flipproof.foreign.comparison import (
     AT_ONCE,
     FAINT,
@@ -231,10 +231,12 @@ def bisected(
             " or ".join(knob_text(PAPER, name) for name in decisive),
             " and ".join(knob_text(knobs, name) for name in decisive),
         )
+        field_advice = _field_advice(comparison, ice=knobs.frozen)
+        knobs_advice = "; or ".join(WORDS[name][1] for name in decisive)
         return (
             f"{ice}right at {paper_words}, wrong at {throw_words} where other things are changed, too: {wrong_text}",
             together or _impact_advice(comparison),
-            f"{'; or '.join(WORDS[name][1] for name in decisive)}{_field_advice(comparison, '; ', ice=knobs.frozen)}",
+            field_advice if comparison.whole_turns else f"{knobs_advice}{field_advice and f'; {field_advice}'}",
         )
     return (
         f"{ice}{wrong_text} where {', '.join(knob_text(knobs, name) for name in names)}",
@@ -357,10 +359,12 @@ def _impact_advice(comparison: Comparison) -> str:
     )
 
 
-def _field_advice(comparison: Comparison, prefix: str = "", *, ice: bool = False) -> str:
+def _field_advice(comparison: Comparison, *, ice: bool = False) -> str:
     """Return what to look at by the wrong fields, if omega is right; not for a small error after impacts."""
+    if comparison.whole_turns:
+        return WRAPPED
     if ice and set(comparison.wrong) == {"v"}:
-        return f"{prefix}what is frozen does not move in the bottle: its v is 0 and stays 0"
+        return "what is frozen does not move in the bottle: its v is 0 and stays 0"
     if (
         comparison.error
         or "omega" in comparison.wrong
@@ -377,6 +381,6 @@ def _field_advice(comparison: Comparison, prefix: str = "", *, ice: bool = False
     fields = ", ".join(comparison.wrong)
     if set(comparison.wrong) == {"impacts"}:
         listed = comparison.listed or "look at time, slice, end and number of each"
-        return f"{prefix}the motion is right, the impacts listed are not: {listed}"
+        return f"the motion is right, the impacts listed are not: {listed}"
     closer = ", and at sign, unit and instant of v" if fields == "v" else ""
-    return f"{prefix}omega is right, {fields} not: look at how the answer is put together{closer}"
+    return f"omega is right, {fields} not: look at how the answer is put together{closer}"

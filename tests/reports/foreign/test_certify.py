@@ -677,6 +677,10 @@ def begun_nearer_to_the_middle(throw, answer):
     return answer | {"r_cm": answer["r_cm"] + error, "inertia": inertia}
 
 
+def whole_turn_off(throw, answer):
+    return answer | {"theta": answer["theta"] + 2 * np.pi * (abs(throw.theta0) > np.pi)}
+
+
 def listed(chosen=lambda _: slice(None), **changed):
     """Answer the list of impacts, too, but only those ``chosen``, and some of their fields ``changed``."""
 
@@ -696,6 +700,7 @@ def listed(chosen=lambda _: slice(None), **changed):
             begun_nearer_to_the_middle,
             "already at release it is 0.25 times as far from the bottle's middle",
         ),
+        ("elsewhere", whole_turn_off, "theta is off by whole turns: do not wrap it"),
         ("elsewhere", listed(lambda hits: hits.end > 0), "are missing, those on the cap"),
         ("elsewhere", listed(lambda hits: np.arange(len(hits)) < 1), "are missing, those after the first"),
         ("elsewhere", listed(slice=lambda hits: 0 * hits["slice"]), "name another slice"),

@@ -7,6 +7,7 @@ import pytest
 from made_up import Exact
 from planted import InProcess, Patch, patches
 
+from flipproof.foreign.causes import _without_strays
 from flipproof.foreign.certify import FAILED, IDLE, PASSED, certify
 from flipproof.foreign.checking import NotApplicableError, drive
 from flipproof.foreign.contract import ForeignError
@@ -134,6 +135,16 @@ def test_the_check_fails_where_the_solver_departs():
     assert result.verdict == FAILED
     assert "departs in" in result.line
     assert "its slices accelerate by -0.02 x g cos(theta) besides" in result.line
+
+
+def test_few_strays_hide_no_term_and_many_are_no_strays():
+    term = np.cos(np.linspace(0.0, 3.0, 200))
+    table = {"g cos(theta)": term, "a constant": np.ones(200)}
+    for count, kept in ((4, 196), (40, 200)):
+        target = 0.1 * term
+        target[:count] = 5.0
+        left, rest = _without_strays(table, target)
+        assert [len(values) for values in (*left.values(), rest)] == [kept] * 3
 
 
 def test_answers_beyond_all_bounds_break_nothing():
