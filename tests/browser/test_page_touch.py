@@ -37,6 +37,14 @@ def test_a_curve_goes_and_comes_by_its_button(chart):
     assert line.count() == 1
 
 
+def test_an_index_stays_in_the_button_of_a_curve_that_is_off(visit):
+    """As in "drag against C_M", of which "drag against C" was seen."""
+    with visit((1280, 900), at="evidence.html#figure-differences") as visited:
+        button = visited.page.wait_for_selector("[data-toggle='drag against C_M']", state="attached")
+        assert button.get_attribute("aria-pressed") == "false"
+        assert button.query_selector("sub").evaluate("(index) => getComputedStyle(index).display") != "none"
+
+
 def test_the_cursor_tells_what_the_summary_has(chart, report):
     svg = chart.page.locator("#figure-omega .chart-touched")
     svg.focus()
