@@ -222,7 +222,7 @@ def test_only_a_rung_from_eq8_to_free_flight_can_be_what_moves_eq8_most():
 @pytest.mark.parametrize(
     ("value", "finer", "said"),
     [
-        (0.0, 0.04, " With 100 slices Eq. 8 and free flight part by up to 4 %."),
+        (0.0, 0.04, " With 100 slices Eq. 8 and free flight differ by up to 4 %."),
         (0.3, 0.003, "up to 0.3 %."),
         (0.3, 0.2, ""),
     ],

@@ -189,8 +189,8 @@ def _with_more_slices(by_id: Mapping[str, Headline]) -> str:
     """Return what more slices move over PARTING_BAND, either way, in a sentence; empty if nothing."""
     words = {
         "step": "the time step moves ω",
-        "formulas": "program and Eq. 8 part",
-        "eq8-free": "Eq. 8 and free flight part",
+        "formulas": "the program and Eq. 8 differ",
+        "eq8-free": "Eq. 8 and free flight differ",
     }
     moved = [
         (by_id[id_].finer_slices, f"{text} by up to {percent(by_id[id_].finer or 0.0)}")
@@ -441,10 +441,16 @@ def _layers(summary: Summary, numbers: Mapping[str, Number | None]) -> list[Simp
             coarse = crosses(number.value, finer) or _apart(number.value, finer)
             layers.append(
                 SimpleNamespace(
-                    id=id_, name=name, section=section, question=question, number=number, within=number.within,
-                    coarse=coarse, **more,
+                    id=id_,
+                    name=name,
+                    section=section,
+                    question=question,
+                    number=number,
+                    within=number.within,
+                    coarse=coarse,
+                    **more,
                 )
-            )  # fmt: skip
+            )
     return layers
 
 
