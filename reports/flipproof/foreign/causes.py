@@ -383,7 +383,7 @@ STRAYS: Final = 0.05
 
 def _without_strays(table: Mapping[str, FloatArray], target: FloatArray) -> tuple[dict[str, FloatArray], FloatArray]:
     """Return terms and accelerations without the largest, if few are far larger than most."""
-    kept = np.abs(target) <= 6.0 * np.median(np.abs(target))
+    kept = np.abs(target) <= 6.0 * np.median(np.abs(target)) if len(target) else np.array([False])
     if np.mean(kept) < 1.0 - STRAYS:
         return dict(table), target
     return {name: values[kept] for name, values in table.items()}, target[kept]

@@ -35,7 +35,7 @@ class Interval:
     expected : mapping - by field what the equation gives at the second output
     hits : tuple of (slice, end, time) - impacts in the equation
     speeds : tuple of float - the speed of each before it, relative to the bottle [m/s]
-    slowest_rebound : float - the lowest speed after one but 0, a fraction of omega_0 L, or infinity
+    slowest_rebound : float - the lowest speed after one of a slice that flew, a fraction of omega_0 L, or infinity
     before, after : array, shape (N,) - end on which each slice rests at either output in the equation, or 0
     departure : mapping
         By field the largest difference from ``expected``, a fraction of its scale; for omega, from what the angular
@@ -123,7 +123,8 @@ def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[I
         difference = {
             name: np.max(np.abs(getattr(answer, name)[k + 1] - expected[name])) / scale[name] for name in FIELDS
         }
-        speeds = flight.impacts.speed_after
+        impacts = flight.impacts
+        rebounds = impacts.speed_after[impacts.speed_before > rest_speed]  # a slice at rest strikes with no speed
         intervals.append(
             Interval(
                 number=number,
@@ -139,7 +140,7 @@ def intervals_of(equation: str, number: int, ask: Ask, answer: Answer) -> list[I
                     zip(*(getattr(flight.impacts, name).tolist() for name in ("slice", "end", "time")), strict=True)
                 ),
                 speeds=tuple(flight.impacts.speed_before.tolist()),
-                slowest_rebound=float(np.min(speeds[speeds > 0.0], initial=np.inf) / scale["v"]),
+                slowest_rebound=float(np.min(rebounds, initial=np.inf) / scale["v"]),
                 before=_resting(throw, places, v[0], 2 * rest_speed),
                 after=_resting(throw, expected["r"], expected["v"], 0.0),
                 departure={name: min(float(value), 1e3) for name, value in difference.items()},  # its square is finite

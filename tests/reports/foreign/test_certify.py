@@ -884,7 +884,7 @@ def test_an_equation_can_be_asked_for():
 @pytest.mark.slow
 def test_what_spoils_an_equation_is_named():
     (result,) = certify(InProcess(MISTAKES["Weight"](), "x"), ["equation"]).results
-    assert "right without weight" in result.line
+    assert "x g cos(theta) besides" in result.line
 
 
 def test_the_passport_is_json_and_the_verdicts_are_junit():
