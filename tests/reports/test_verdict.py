@@ -222,8 +222,8 @@ def test_only_a_rung_from_eq8_to_free_flight_can_be_what_moves_eq8_most():
 @pytest.mark.parametrize(
     ("value", "finer", "said"),
     [
-        (0.0, 0.04, " With 100 slices Eq. 8 and free flight differ by up to 4 %."),
-        (0.3, 0.003, "up to 0.3 %."),
+        (0.0, 0.04, " But cut into 100 slices Eq. 8 and free flight differ by up to 4 %."),
+        (0.3, 0.003, "differ by only up to 0.3 %."),
         (0.3, 0.2, ""),
     ],
 )
@@ -231,7 +231,7 @@ def test_more_slices_that_turn_an_answer_round_are_in_it(value, finer, said):
     numbers = [made_up("step", 0.001, finer=0.002, finer_slices=100), made_up("whole", 0.2)]
     words = answer([*numbers, made_up("eq8-free", value, finer=finer, finer_slices=100)])
     assert words.endswith(said)
-    assert ("With 100 slices" in words) is bool(said)
+    assert ("But cut into 100 slices" in words) is bool(said)
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,9 @@ def test_a_number_beyond_the_limit_is_not_printed_as_the_limit(share, words):
 def test_a_weight_that_moves_nothing_moves_nothing_most():
     still = {"id": "pair", "what": "gravity in Eq. 8", "value": 0.0, "measure": "largest"}
     assert not story({"headlines": [still]}).weight_first
-    assert story({"headlines": [still | {"value": 0.1}]}).weight_first
+    assert not story({"headlines": [still | {"value": "nan"}]}).weight_first
+    for value in (0.1, "inf"):
+        assert story({"headlines": [still | {"value": value}]}).weight_first
 
 
 @pytest.mark.parametrize(("finer", "coarse"), [(0.03, True), (0.2, False), (0.7, True), (None, False)])

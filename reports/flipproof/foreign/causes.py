@@ -56,13 +56,13 @@ def cause_of(intervals: Sequence[Interval], *, recoil: bool, seldom: bool = Fals
 
 
 def _stays(intervals: Sequence[Interval]) -> str:
-    """Return that slices rest from an impact on which the equation lets rebound, if most that strike alone do."""
+    """Return that slices come to rest at impacts from which the equation lets them rebound, if most do."""
     stays = [
         i.speeds[0] if not i.v[1][i.hits[0][0]] and not i.after[i.hits[0][0]] else 0.0
         for i in intervals
         if len(i.hits) == 1 and i.throw.restitution
     ]
-    if not stays or np.mean(np.array(stays) > 0.0) < 0.6:
+    if not stays or np.sum(np.array(stays) > 0.0) < max(0.6 * len(stays), 0.5 * len(intervals)):
         return ""
     return (
         f"the slice that strikes, at up to {max(stays):.2g} m/s, rests from then on: look at what brings a slice to "
@@ -82,8 +82,9 @@ def _held(intervals: Sequence[Interval]) -> str:
         sides |= set(side[held].tolist())
         drifts.append(np.any(moved & (i.v[1] != 0)))
     if np.mean(stays) > 0.5:
-        end = "an end that" if len(sides) > 1 else f"the {'base' if BASE in sides else 'cap'}, which"
-        return f"slices stay on {end} lets them go: look at when a slice at rest is let go"
+        end = f"the {'base' if BASE in sides else 'cap'} where the equation lets them go"
+        end = "an end that lets them go" if len(sides) > 1 else end
+        return f"slices stay on {end}: look at when a slice at rest is let go"
     if np.mean(drifts) > 0.5:
         return "a slice keeps its velocity to the last digit, as if at rest: look at when a slice at rest is let go"
     return ""
@@ -366,7 +367,9 @@ def _motion_cause(samples: Sequence[Sequence[Interval]], *, seldom: bool) -> str
     if (field := _only_field(samples[0])) not in ("", "v"):
         return f"{field} alone is off"
     fits = [(intervals, *fit) for intervals in samples if (fit := _terms_of(intervals)) is not None]
-    few_left_out = [(intervals, *_without_strays(table, target)) for intervals, table, target in fits]
+    few_left_out = [
+        (intervals, *left) for intervals, table, target in fits if (left := _without_strays(table, target)) is not None
+    ]
     for chosen in (fits, few_left_out):
         for count, rest in ((1, EXPLAINED), (1, OF_STRONG_DRAG), (2, EXPLAINED), (3, EXPLAINED)):
             for intervals, table, target in chosen:
@@ -381,11 +384,13 @@ STRAYS: Final = 0.05
 """Share of accelerations that may be left out: a slice that is let go at another instant has one of another kind."""
 
 
-def _without_strays(table: Mapping[str, FloatArray], target: FloatArray) -> tuple[dict[str, FloatArray], FloatArray]:
-    """Return terms and accelerations without the largest, if few are far larger than most."""
+def _without_strays(
+    table: Mapping[str, FloatArray], target: FloatArray
+) -> tuple[dict[str, FloatArray], FloatArray] | None:
+    """Return terms and accelerations without those far larger than most; None unless these are few."""
     kept = np.abs(target) <= 6.0 * np.median(np.abs(target)) if len(target) else np.array([False])
-    if np.mean(kept) < 1.0 - STRAYS:
-        return dict(table), target
+    if np.mean(kept) < 1.0 - STRAYS or kept.all():
+        return None
     return {name: values[kept] for name, values in table.items()}, target[kept]
 
 
@@ -476,8 +481,9 @@ def _motion_words(throw: Scenario, names: tuple[str, ...], factors: FloatArray, 
     if names == (WEIGHT_OF_ITS_OWN,) and factor > 0.0:
         return f"slices weigh as if g were {factor:.3g} m/s^2 where it is 0: take gravity from the throw"
     weight = throw.gravity * (1.0 + factor)
-    if names == ("g cos(theta)",) and abs(weight - 9.81) < 0.02:
-        return f"slices weigh as if g were 9.81 m/s^2 where it is {throw.gravity:.3g}: look at where gravity comes from"
+    if names == ("g cos(theta)",) and abs(weight - 9.81) < 0.02 < abs(throw.gravity - 9.81):
+        g = f"{weight:.4g} m/s^2 where it is {throw.gravity:.3g}"
+        return f"slices weigh as if g were {g}: look at where gravity comes from"
     parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(names, factors, strict=True))
     return f"its slices accelerate by {parts} besides{where}"
 

@@ -233,6 +233,7 @@ class _Recorder(Runner):
             self.late = True
             with suppress(ValueError):  # another error, or an equation that has no limit
                 until = until_when(self.last, self.runner, equation)
+            self.runner.forgive()
         return f"{ASKED}{_question(self.last)}" + (f"; {until}" if until else "")
 
 

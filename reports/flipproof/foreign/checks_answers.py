@@ -265,9 +265,10 @@ SLOW: Final = replace(THROW, omega0=THROW.omega0 / 8, duration=8 * THROW.duratio
 """A throw that turns as far as ``THROW`` in eight times the time."""
 
 
-LISTED: Final = "speeds of an impact are those in the bottle, before it and after it: look at how impacts are answered"
-RIGHT_MOTION: Final = "from one output to the next the motion is right"
-"""What to look at if the speeds of impacts are wrong, and what is said if no motion between outputs is."""
+LISTED: Final = "answer the speeds of an impact in the bottle, just before it and just after it"
+"""What to look at if the speeds of impacts are wrong."""
+
+RIGHT_MOTION: Final = "the motion is right from one output to the next"
 
 
 DEFINED: Final = {
@@ -359,7 +360,7 @@ def check_definitions(traits: Traits) -> CheckGenerator:
         if not (holds and answer.r is not None and given):
             advice = "" if holds else _rebound_advice(hits)
             if not (holds or advice):
-                advice = yield from _departure_advice(traits, f"{RIGHT_MOTION}, {LISTED}")
+                advice = yield from _departure_advice(traits, f"{RIGHT_MOTION}: {LISTED}")
                 if not advice and answer.r is not None and given and answer.t[0] == 0.0:
                     drifts = [n for n, errors in _defined(answer)[1].items() if n in given and errors.max() > bound]
                     advice = (yield from _drift_advice(traits, answer, drifts[0], bound)) if drifts else ""
@@ -559,6 +560,10 @@ def _release_advice(answer: Answer, expected: FloatArray, bound: float) -> str:
     if answer.t[0] > 0.0 or answer.r_cm is None or abs(answer.r_cm[0] - expected[0]) <= bound * THROW.bottle.length:
         return ""
     share = (answer.r_cm[0] - middle) / (expected[0] - middle)
+    if share < 0.0:
+        return "already at release it is on the other side of the bottle's middle; "
+    if abs(share - 1.0) < 0.01:
+        return ""
     return (
         f"already at release it is {share:.3g} times as far from the bottle's middle as it should be: look at the sum "
         "over the slices and the masses with which it begins; "

@@ -14,6 +14,7 @@ from flipproof.foreign import elsewhere
 from flipproof.foreign.checking import (
     SMOOTH,
     THROW,
+    WRAPPED,
     CheckGenerator,
     NotApplicableError,
     Observation,
@@ -25,6 +26,7 @@ from flipproof.foreign.checking import (
     shift,
     time_of_max,
     times_of,
+    whole_turns,
 )
 from flipproof.foreign.checks_answers import drift, parts_advice
 from flipproof.foreign.checks_questions import STARTS
@@ -32,7 +34,7 @@ from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits, starte
 from flipproof.foreign.departures import departing
 from flipproof.foreign.place import THROWS, curve, name_of, placing, switches_of
 from flipproof.foreign.throws import far_from_ends
-from flipproof.frame.equations import CHANGES
+from flipproof.frame.equations import DIFFERENCES
 from flipproof.frame.solvers import solve
 from slicemodel import Scenario
 from slicemodel.trajectory import FloatArray
@@ -113,6 +115,8 @@ def check_mirror(traits: Traits) -> CheckGenerator:
         sizes = [float(_mirror_errors(*pair)["omega"].max()) for pair in pairs]
         advice = _right_without(sizes, bound) + "look for abs(omega), a sign of theta, another angle than theta in "
         advice += "the weight, or a place that assumes omega > 0"
+    elif wrong == "theta" and whole_turns(original.theta + mirrored.theta, 1e-6):
+        advice = WRAPPED
     elif wrong:
         advice = f"omega is mirrored, {wrong} is not: look at signs where {wrong} is advanced, and between steps"
     if wrong and (mirrored.theta[1] - mirrored.theta[0]) * mirrored.omega[0] < 0.0:
@@ -120,7 +124,7 @@ def check_mirror(traits: Traits) -> CheckGenerator:
     shown = wrong or "omega"
     return Observation(
         holds=not wrong,
-        expected=f"omega -> -omega, theta -> -theta, r -> r within {bound:.1g} of each",
+        expected=f"omega -> -omega, theta -> -theta, the same r within {bound:.1g} of omega_0, angle turned and L",
         observed=f"{shown} off by {errors[shown].max():.2g}",
         where=time_of_max(original.t, errors[shown]),
         advice=advice,
@@ -296,7 +300,7 @@ def check_equation(traits: Traits) -> CheckGenerator:
         wanted = switches_of(declared)
         differing = [
             words
-            for name, words in CHANGES.items()
+            for name, words in DIFFERENCES.items()
             if name not in place.inert and getattr(place.switches, name) != getattr(wanted, name)
         ]
         advice += f"{declared} differs from {place.equation} in {' and in '.join(differing)}; "

@@ -21,6 +21,7 @@ from flipproof.foreign.checking import (
     Observation,
     ask_of,
     decimals_of,
+    effort_of,
     shift,
 )
 from flipproof.foreign.contract import Answer, Ask, ForeignError, Traits
@@ -219,14 +220,14 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         if not advice:
             orders_inside = _orders(traits, (yield from _changes_before(traits, SMOOTH, levels, inside=True)))
             flying = bool(orders_inside) and min(orders_inside.values()) >= required
-            term = elsewhere.LOOK_AT[calm] if calm else "the motion of the others"
             if flying:
-                without = f"without {calm}, and " if calm else ""
-                advice = f"of that order {without}where no slice rests: look at the part of slices at rest in {term}"
+                without = f"without {calm}, and also with it " if calm else ""
+                part = f"the {calm}" if calm else "the motion of the others"
+                advice = f"of that order {without}where no slice rests: look at the part of slices at rest in {part}"
             elif calm:
                 advice = (
-                    f"of that order without {calm}: look at the instant of {term}, and whether an iteration with it "
-                    "converges"
+                    f"of that order without {calm}: look at the instant of {elsewhere.LOOK_AT[calm]}, and whether an "
+                    "iteration with it converges"
                 )
     low, right = ([name for name, order in orders.items() if (order < required) == below] for below in (True, False))
     if low and right:
@@ -276,11 +277,14 @@ def _changes_alike(traits: Traits) -> CheckGenerator:
     sizes = {name: values[-1] for name, values in changes.items()}
     least, most = (select(sizes, key=lambda name: sizes[name]) for select in (min, max))
     floor = max(ROUNDOFF, 64 * traits.epsilon)
+    if sizes[most] <= APART * floor:
+        raise NotApplicableError(f"changes under refinement are round-off, {sizes[most]:.2g} or less")
+    coarse, fine = (effort_of(traits, SMOOTH, level) for level in (2, 4))
     return Observation(
         holds=sizes[most] <= APART * max(sizes[least], floor),
         expected=f"fields that change alike, within a factor of {APART:g}",
         observed=f"{most} by {sizes[most]:.2g}, {least} by {sizes[least]:.2g}",
-        where="0.05 s in which the equation has no impact, rtol from 1e-08 to 1e-10",
+        where=f"0.05 s in which the equation has no impact, rtol from {coarse:.0e} to {fine:.0e}",
         advice=f"look at how {most} is advanced in a step, and answered between two: rtol does not control its error",
     )
 

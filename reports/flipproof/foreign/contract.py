@@ -396,5 +396,8 @@ class Runner:
         """Return its checked answer; raise ForeignError if there is none."""
         raise NotImplementedError
 
+    def forgive(self) -> None:
+        """Forget late answers but one: those of a search for the last that came in time do not count."""
+
     def close(self) -> None:
         """End its process, if it has one."""

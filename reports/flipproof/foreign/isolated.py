@@ -88,6 +88,10 @@ class Isolated(Runner):
         except AnswerError as error:
             raise ForeignError(f"answer: {error}") from None
 
+    def forgive(self) -> None:
+        """Forget late answers but one."""
+        self._timeouts = min(self._timeouts, 1)
+
     def close(self) -> None:
         """End the process and whatever it started, without waiting for pipes that others hold open."""
         process, self._process = self._process, None

@@ -21,6 +21,12 @@ TOGETHER: Final = 0.01
 MAX_CUTS: Final = 20
 """Throws that are tried at most."""
 
+MAX_SECONDS: Final = 60.0
+"""Seconds after which no longer throw is tried."""
+
+MAX_HITS: Final = 3
+"""Impacts that are told at most."""
+
 
 def until_when(ask: Ask, runner: Runner, equation: str) -> str:
     """Return in words until when a solver answers a throw that it was late with, how well, and what comes then.
@@ -32,8 +38,10 @@ def until_when(ask: Ask, runner: Runner, equation: str) -> str:
     impacts = ode_reference.solve(throw, model, times=ask.times).impacts or NO_IMPACTS
     between = [0.0, *impacts.time[impacts.time < end], end]
     cuts = [(a + b) / 2 for a, b in pairwise(between) if b - a > TOGETHER * end][:MAX_CUTS]
-    answered, words = 0.0, ""
+    answered, reached, beginning = 0.0, "", time.perf_counter()
     for cut in cuts:
+        if time.perf_counter() - beginning > MAX_SECONDS:
+            break
         hits = [hit for hit in impacts if answered < hit.time < cut]
         effort = ask.effort
         if runner.traits.refined_by == "steps" and effort is not None:
@@ -42,17 +50,19 @@ def until_when(ask: Ask, runner: Runner, equation: str) -> str:
         try:
             answer = runner(replace(ask, scenario=replace(ask.scenario, duration=cut), times=times, effort=effort))
         except LateError:
-            begin = f"{words}, but not" if words else "nor does it answer"
-            return f"{begin} until t = {cut:.4g} s; by {equation}, {_happening(hits)} in between"
+            begin = f"answers up to {reached}, but not" if reached else "does not even answer"
+            when = "in between" if reached else "before"
+            return f"asked for one time it {begin} up to t = {cut:.4g} s; by {equation}, {_happening(hits)} {when}"
         seconds = time.perf_counter() - began
         off = abs(float(answer.omega[0] - ode_reference.solve(throw, model, times=times).omega[0]) / throw.omega0)
         where = "" if any(impacts.time < cut) else ", before any impact"
-        words = f"it answers until t = {cut:.4g} s (in {seconds:.2g} s, omega off by {off:.1g} of omega_0{where})"
+        reached = f"t = {cut:.4g} s (in {seconds:.2g} s, omega off by {off:.1g} of omega_0{where})"
         answered = cut
-    return words
+    return f"asked for one time it answers at least up to {reached}" if reached else ""
 
 
 def _happening(hits: Iterable[Impact]) -> str:
-    """Return impacts in words."""
-    words = {f"slice {hit.slice} strikes the {hit.end}": hit for hit in hits}
-    return ", ".join(text + " and rests" * (hit.speed_after == 0.0) for text, hit in words.items()) or "nothing strikes"
+    """Return impacts in words, the first few of them."""
+    last = {f"slice {hit.slice} strikes the {hit.end}": hit for hit in hits}
+    words = [text + " and rests" * (hit.speed_after == 0.0) for text, hit in last.items()]
+    return ", ".join(words[:MAX_HITS]) + ", ..." * (len(words) > MAX_HITS) or "nothing strikes"

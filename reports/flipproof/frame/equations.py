@@ -18,15 +18,15 @@ NAMES: Final[Mapping[str, str]] = {
 }
 """Switch -> the assumption it changes, in the order of the ladder."""
 
-CHANGES: Final[Mapping[str, str]] = {
-    "signs": "that the drag damps",
+DIFFERENCES: Final[Mapping[str, str]] = {
+    "signs": "whether the drag damps",
     "roots": "the roots of Eq. 9a, omega^2 for omega^2 - gamma^2",
     "drag_on_centre": "what the drag is measured against, C_M or the bottle",
     "weightless": "the weight along the axis, g cos(theta)",
     "origin": "what the drag does to the tube",
     "recoil": "the recoil of the tube in impacts",
 }
-"""Switch -> in what two equations differ that differ by it, whichever is meant."""
+"""Switch -> in what two equations differ if only it differs."""
 
 
 def canonical(switches: Switches) -> Switches:

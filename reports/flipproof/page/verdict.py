@@ -177,7 +177,7 @@ def answer(headlines: Sequence[Headline]) -> str:
     """Return the verdict in short: physics, algebra and step; and which equation to take instead.
 
     Each holds if no curve of omega moves by more than PARTING_BAND of omega_0, NaN fails; weight is named if no other
-    rung from Eq. 8 to free flight moves it further.
+    rung from Eq. 8 to free flight moves it further. What more slices turn round comes last.
     """
     by_id = {headline.id: headline for headline in headlines}
     if not {"step", "eq8-free"} <= set(by_id):
@@ -193,11 +193,11 @@ def _with_more_slices(by_id: Mapping[str, Headline]) -> str:
         "eq8-free": "Eq. 8 and free flight differ",
     }
     moved = [
-        (by_id[id_].finer_slices, f"{text} by up to {percent(by_id[id_].finer or 0.0)}")
+        f"{text} by {'only ' if finer <= PARTING_BAND else ''}up to {percent(finer)}"
         for id_, text in words.items()
-        if id_ in by_id and crosses(by_id[id_].value, by_id[id_].finer)
+        if id_ in by_id and (finer := by_id[id_].finer) is not None and crosses(by_id[id_].value, finer)
     ]
-    return f" With {moved[0][0]} slices {' and '.join(text for _, text in moved)}." if moved else ""
+    return f" But cut into {by_id['eq8-free'].finer_slices} slices {'; '.join(moved)}." if moved else ""
 
 
 def crosses(value: float, finer: float | None) -> bool:
@@ -409,7 +409,7 @@ def story(content: Mapping[str, Any], bottles: ValidityMap | None = None) -> Sim
         nearest=_nearest(summary),
         water=_water(summary),
         weight_first=summary.at("headlines/pair/what") == RUNG_NAMES["weightless"]
-        and (summary.at("headlines/pair/value") or 0.0) > NOTHING,
+        and float(summary.at("headlines/pair/value") or 0.0) > NOTHING,
         map=_map(bottles),
         names=NAMES,
     )

@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import xml.etree.ElementTree as ET
+from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -508,10 +509,13 @@ def test_a_solver_too_slow_for_the_finest_steps_is_not_accused():
     [
         (
             0.15,
-            r"it answers until t = 0\.08\d* s \(in \S+ s, omega off by 0\.05 of omega_0, before any impact\), but not "
-            r"until t = 0\.16\d* s; by free-flight, slice 1 strikes the base in between",
+            r"asked for one time it answers up to t = 0\.08\d* s \(in \S+ s, omega off by 0\.05 of omega_0, before any "
+            r"impact\), but not up to t = 0\.16\d* s; by free-flight, slice 1 strikes the base in between",
         ),
-        (0.0, r"nor does it answer until t = 0\.08\d* s; by free-flight, nothing strikes in between"),
+        (
+            0.0,
+            r"asked for one time it does not even answer up to t = 0\.08\d* s; by free-flight, nothing strikes before",
+        ),
     ],
 )
 def test_a_late_answer_says_until_when_one_comes_and_how_good_it_is(works_until, said):
@@ -527,6 +531,19 @@ def test_a_late_answer_says_until_when_one_comes_and_how_good_it_is(works_until,
     first, second = certify(InProcess(Hanging(), "x"), ["determinism", "inputs"]).results
     assert re.fullmatch(rf"no answer within 60 s; asked: 61 times, .*; {said}", first.text)
     assert second.text == "as in determinism"
+
+
+def test_the_search_for_the_last_answer_in_time_costs_no_later_question(tmp_path):
+    """Two late answers in a row are the last that are waited for."""
+    (tmp_path / "hangs.py").write_text(
+        "import time\n\ndef solve(ask):\n    throw, t = ask.scenario, ask.times\n    if not throw.frozen:\n"
+        "        time.sleep(60)\n    omega = 0 * t + throw.omega0\n"
+        "    return {'t': t, 'theta': throw.theta0 + throw.omega0 * t, 'omega': omega}\n\nsolve.equation = 'eq8'\n"
+    )
+    with closing(opened(f"{tmp_path / 'hangs.py'}:solve", timeout=1.0)) as runner:
+        late, ice = certify(runner, ["shape", "ice"]).results
+    assert "it does not even answer up to t = " in late.text
+    assert ice.verdict == PASSED
 
 
 def test_slices_that_jump_have_no_speed_and_break_no_check():
@@ -700,6 +717,7 @@ def listed(chosen=lambda _: slice(None), **changed):
             begun_nearer_to_the_middle,
             "already at release it is 0.25 times as far from the bottle's middle",
         ),
+        ("mirror", lambda _, answer: answer | {"theta": answer["theta"] % (2 * np.pi)}, "do not wrap it"),
         ("elsewhere", whole_turn_off, "theta is off by whole turns: do not wrap it"),
         ("elsewhere", listed(lambda hits: hits.end > 0), "are missing, those on the cap"),
         ("elsewhere", listed(lambda hits: np.arange(len(hits)) < 1), "are missing, those after the first"),

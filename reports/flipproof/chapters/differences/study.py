@@ -16,6 +16,7 @@ PARTING_BAND = 0.01
 
 def percent(share: float) -> str:
     """Return a fraction as the page prints it: two digits, more if they hide that it is above ``PARTING_BAND``."""
+    share += 0.0  # -0.0
     if abs(share) >= 0.995:
         return f"{100 * share:.0f} %"
     digits, limit = 2, f"{100 * PARTING_BAND:.2g}"

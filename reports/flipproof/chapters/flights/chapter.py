@@ -215,7 +215,7 @@ def figure_over_time(trajectories: Iterable[Trajectory], quantity: str) -> Figur
 def chosen_slices(trajectory: Trajectory) -> list[tuple[int, str]]:
     """Return the slices worth drawing: first, nearest the centre of mass at release, last; fewer if they coincide."""
     nearest = int(np.abs(trajectory.r[0] - trajectory.r_cm[0]).argmin())
-    words = {trajectory.scenario.n_slices - 1: "starts on top of the water"} | {0: "starts on the base"}
+    words = {trajectory.scenario.n_slices - 1: "starts on top of the water", 0: "starts on the base"}
     words.setdefault(nearest, "starts nearest the centre of mass")
     return sorted(words.items())
 

@@ -53,10 +53,12 @@ def claim_waterfall(waterfall: Waterfall) -> Finding:
         f"{words}: {', '.join(f'{name} {share:+.3g}' for name, share in shares.items())}"
         for words, shares in waterfall.groupings.items()
     )
-    name = largest.name if largest.average else "none"
+    share = (
+        f"{largest.name}, {largest.average:+.3g} ± {largest.average_band:.1g}, from {largest.low:+.3g} to "
+        f"{largest.high:+.3g} in single orders, at"
+    )
     note = (
-        f"largest fair share (mean over all orders): {name}, {largest.average:+.3g} ± "
-        f"{largest.average_band:.1g}, from {largest.low:+.3g} to {largest.high:+.3g} in single orders, at "
+        f"largest fair share (mean over all orders): {share if abs(largest.average) > 1e-12 else 'none at'} "
         f"N = {waterfall.slices}{finer}; the bars miss the whole by {waterfall.residual:.1g}; "
         f"in other counts of what is one change: {'; '.join(counts)}"
     )
