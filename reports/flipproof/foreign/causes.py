@@ -482,7 +482,7 @@ def _motion_words(throw: Scenario, names: tuple[str, ...], factors: FloatArray, 
         return f"slices weigh as if g were {factor:.3g} m/s^2 where it is 0: take gravity from the throw"
     weight = throw.gravity * (1.0 + factor)
     if names == ("g cos(theta)",) and abs(weight - 9.81) < 0.02 < abs(throw.gravity - 9.81):
-        g = f"{weight:.4g} m/s^2 where it is {throw.gravity:.3g}"
+        g = f"about {weight:.3g} m/s^2 where it is {throw.gravity:.3g}"
         return f"slices weigh as if g were {g}: look at where gravity comes from"
     parts = " and ".join(f"{factor:+.2g} x {name}" for name, factor in zip(names, factors, strict=True))
     return f"its slices accelerate by {parts} besides{where}"
