@@ -361,7 +361,7 @@ def check_definitions(traits: Traits) -> CheckGenerator:
             advice = "" if holds else _rebound_advice(hits)
             if not (holds or advice):
                 advice = yield from _departure_advice(traits, f"{RIGHT_MOTION}: {LISTED}")
-                if not advice and answer.r is not None and given and answer.t[0] == 0.0:
+                if not advice and answer.r is not None and given:
                     drifts = [n for n, errors in _defined(answer)[1].items() if n in given and errors.max() > bound]
                     advice = (yield from _drift_advice(traits, answer, drifts[0], bound)) if drifts else ""
                 advice = advice or LISTED
@@ -557,7 +557,7 @@ def _follows(answer: Answer, derived: Mapping[str, FloatArray]) -> bool:
 def _release_advice(answer: Answer, expected: FloatArray, bound: float) -> str:
     """Return how r_cm is wrong at release already, if it is."""
     middle = THROW.bottle.length / 2
-    if answer.t[0] > 0.0 or answer.r_cm is None or abs(answer.r_cm[0] - expected[0]) <= bound * THROW.bottle.length:
+    if answer.r_cm is None or abs(answer.r_cm[0] - expected[0]) <= bound * THROW.bottle.length:
         return ""
     share = (answer.r_cm[0] - middle) / (expected[0] - middle)
     if share < 0.0:

@@ -109,7 +109,9 @@ def check_mirror(traits: Traits) -> CheckGenerator:
     bound = max(1e-9, 1024 * traits.epsilon)  # the launch is not mirrored, and round-off grows with every impact
     wrong = next((name for name in errors if not errors[name].max() <= bound), "")
     advice = ""
-    if wrong == "omega":
+    if wrong and (mirrored.theta[1] - mirrored.theta[0]) * mirrored.omega[0] < 0.0:
+        advice = "with omega below 0 theta grows: look at the sign of omega where theta is advanced"
+    elif wrong == "omega":
         answers = yield [ask for throw in SIMPLER.values() for ask in _mirrored(traits, throw)]
         pairs = zip(answers[::2], answers[1::2], strict=True)
         sizes = [float(_mirror_errors(*pair)["omega"].max()) for pair in pairs]
@@ -119,8 +121,6 @@ def check_mirror(traits: Traits) -> CheckGenerator:
         advice = WRAPPED
     elif wrong:
         advice = f"omega is mirrored, {wrong} is not: look at signs where {wrong} is advanced, and between steps"
-    if wrong and (mirrored.theta[1] - mirrored.theta[0]) * mirrored.omega[0] < 0.0:
-        advice = "with omega below 0 theta grows: look at the sign of omega where theta is advanced"
     shown = wrong or "omega"
     return Observation(
         holds=not wrong,
