@@ -136,6 +136,14 @@ class CappedEuler(MISTAKES["Euler"]):
         return super().steps(span, min(dt, 3e-4))
 
 
+class Carried(Subject):
+    """Theta drifts with the velocity of the launch."""
+
+    def solve(self, ask):
+        found = super().solve(ask)
+        return found | {"theta": found["theta"] + 1e-4 * ask.scenario.launch_velocity[0] * ask.times}
+
+
 class ThickEnds(Subject):
     """What is within 3 mm of an end touches it."""
 
@@ -154,7 +162,17 @@ class HitsReported(Subject):
         return super().solve(ask) | {"impacts": self.spoil(rows)}
 
 
-MINE = (Overshoot, InitialOmega, EffortIgnored, InertiaAboutTheCap, HalfSpeed, WeightBelowNine, AlwaysHalf, IceForward)
+MINE = (
+    Overshoot,
+    InitialOmega,
+    EffortIgnored,
+    InertiaAboutTheCap,
+    HalfSpeed,
+    WeightBelowNine,
+    AlwaysHalf,
+    IceForward,
+    Carried,
+)
 
 SEES = {
     "digits": "SinglePrecision",
@@ -172,7 +190,7 @@ SEES = {
     "equation": "NoDrag",
     "gravity": "WeightBelowNine",
     "mirror": "PositiveSpin",
-    "moving-frame": "AirDrag",
+    "moving-frame": "Carried",
     "order-before-impacts": "Euler",
 }
 """Check -> a mistake that it sees; "elsewhere" has tests of its own."""
