@@ -1,4 +1,4 @@
-r"""Water as one column that stretches uniformly: it cannot overlap, and there is nothing to choose about it.
+r"""Water as one column that stretches uniformly: it cannot overlap, and its final omega needs no drag.
 
      cap                    front              foot = base
       |                       |<------ h ------->|   --> u_r

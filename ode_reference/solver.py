@@ -39,12 +39,12 @@ WATERS: Final[Mapping[str, Water]] = MappingProxyType(
     {
         COLUMN: Water(
             "m_e h'' = omega^2/2 dJ/dh - (N alpha/3) h', one column of height h",
-            "Water as one uniformly stretching column: it cannot overlap, a full bottle turns like ice, and there is "
-            "nothing to choose.",
+            "Water as one uniformly stretching column: it cannot overlap, a full bottle turns like ice, and the "
+            "final omega does not depend on the drag.",
         ),
         RODS: Water(
             "x'' = omega^2 x - (alpha/m) (x' - B') until it meets a pile on base or cap, from C_M, no rebound",
-            "Water as infinitely many rods that cannot overlap and do not bounce: nothing to choose, either.",
+            "Water as infinitely many rods that cannot overlap and do not bounce; the drag is the only parameter.",
         ),
     }
 )

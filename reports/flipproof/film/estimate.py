@@ -86,7 +86,7 @@ DRAWS: Final = 8000
 TRUST: Final = 0.7
 """Power of likelihood and prior in the posterior that is drawn: no hand and no click is quite as they assume.
 
-It makes intervals 1.2 times as wide, as deviations in 55 films of another author required. Evidence is unaffected.
+It makes intervals 1.2 times as wide, as deviations in earlier films of another author required. Evidence is unaffected.
 """
 
 UNITS: Final = {
