@@ -278,7 +278,7 @@ def certify(
         if name == "digits" and results[-1].verdict == WEAK and results[-1].observation is not None:
             traits = replace(traits, precision=results[-1].observation.facts["precision"])
     if names == tuple(CHECKS):
-        results.append(_coverage(results))
+        results.append(_coverage(results, traits))
         say(results[-1])
     return Certificate(traits=declared, results=tuple(results), domain=recorder.domain)
 
@@ -307,9 +307,12 @@ def _result(name: str, check: Check, traits: Traits, recorder: _Recorder) -> Res
     )
 
 
-def _coverage(results: Iterable[Result]) -> Result:
-    """Return whether half of the checks could run, and more than half of these were not expected to fail."""
-    counted = [r for r in results if r.check != "published-vectors"]
+def _coverage(results: Iterable[Result], traits: Traits) -> Result:
+    """Return whether half of the checks could run, and more than half of these were not expected to fail.
+
+    Neither the published vectors count nor the equation of a solver that declares none.
+    """
+    counted = [r for r in results if r.check != "published-vectors" and (traits.equation or r.check != "equation")]
     applicable = [r for r in counted if r.verdict not in (IDLE, WAITING)]
     not_excused = [r for r in applicable if r.verdict != EXPECTED]
     observed = f"{len(applicable)} of {len(counted)} checks could be made"

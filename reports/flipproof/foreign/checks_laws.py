@@ -275,11 +275,28 @@ def _on_grid(throw: Scenario, times: FloatArray, traits: Traits) -> Ask:
     return Ask.of(throw, times, effort)
 
 
+WHERE_PLACED: Final = f"{len(THROWS)} throws of {THROWS[0].duration:g} to {THROWS[-1].duration:g} s"
+"""What a solver is placed by, in words."""
+
+
 def check_equation(traits: Traits) -> CheckGenerator:
-    """The solver is nearest to the equation it declares, and no farther from it than its own error explains."""
+    """The solver is nearest to the equation it declares, and no farther from it than its own error explains.
+
+    A solver that declares none is near one of the ladder's.
+    """
     place = yield from placing(traits)
-    if traits.equation is None:
+    if traits.equation is None and place.on_lattice:
         raise NotApplicableError(f"none is declared; {place.text}", {"place": place.to_mapping()})
+    if traits.equation is None:
+        return Observation(
+            holds=False,
+            expected="an equation of the ladder; none is declared",
+            observed=place.text,
+            where=WHERE_PLACED,
+            advice="declare the equation that it is meant to solve (solve.equation, or --equation) to be told where it "
+            "departs from it; if it is meant to solve another, declare that as an expected failure",
+            facts={"place": place.to_mapping()},
+        )
     try:
         declared = name_of(switches_of(traits.equation))
     except ValueError as error:
@@ -312,7 +329,7 @@ def check_equation(traits: Traits) -> CheckGenerator:
         holds=holds and not deviation,
         expected=declared,
         observed=place.text + (f", but {deviation}" if deviation else ""),
-        where=f"{len(THROWS)} throws of {THROWS[0].duration:g} to {THROWS[-1].duration:g} s",
+        where=WHERE_PLACED,
         advice=advice.removesuffix("; ")
         or "flipproof explain compares it with the declared equation, switch by switch",
         weak=weak,

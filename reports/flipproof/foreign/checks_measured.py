@@ -443,13 +443,13 @@ def check_piecewise(traits: Traits) -> CheckGenerator:
     declared = name_of(switches_of(equation))
     if place.on_lattice and place.equation != declared:
         raise NotApplicableError("told by the check of the equation")
-    if traits.equation is None and not place.on_lattice:
+    if traits.equation is None and not (place.on_lattice or (place.clear and place.change is not None)):
         raise NotApplicableError("no equation is declared")
     asks = [knobs.ask(0) for knobs in PIECES]
     departure, advice = yield from departures.departing(traits, declared, asks, [CROWDED.ask(0)])
     return Observation(
         holds=not departure,
-        expected=f"{declared} from one output to the next",
+        expected=f"{declared}{'' if traits.equation else ', the nearest equation,'} from one output to the next",
         observed=f"departs {departure}" if departure else "no departure beyond the step's own error",
         where=f"{len(asks)} throws, begun anew from the solver's own state at each of {departures.OUTPUTS} outputs",
         advice=advice,

@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 
 import made_up
 import numpy as np
@@ -109,6 +110,13 @@ class AlwaysHalf(Exact):
 
     def thrown(self, throw):
         return replace(throw, restitution=0.5)
+
+
+class HalfDrag(Exact):
+    """The drag on slices is half of what it is."""
+
+    def thrown(self, throw):
+        return replace(throw, drag=throw.drag / 2)
 
 
 class TenthLost(Exact):
@@ -877,7 +885,7 @@ def test_what_declares_nothing_is_not_certified():
             return {"t": ask.times, "theta": ask.scenario.theta0 + omega * ask.times, "omega": omega}
 
     found = certify(InProcess(Still(), "still"))
-    assert [r.check for r in found.failed] == ["inputs", "enough"]
+    assert [r.check for r in found.failed] == ["inputs", "equation", "enough"]
     assert "declare equation, refined_by and order" in found.failed[-1].line
 
 
@@ -892,6 +900,31 @@ def test_what_a_solver_does_not_say_is_not_held_against_it():
     undeclared = type("Undeclared", (Subject,), {"equation": None, "order": None})
     found = certify(InProcess(undeclared(), "x"), ["order-before-impacts", "gravity"])
     assert [r.reason.partition(";")[0] for r in found.results] == ["no order is declared", "no equation is declared"]
+
+
+def undeclared(kind):
+    """Return a solver of this kind that declares no equation."""
+    solver = kind()
+    return InProcess(SimpleNamespace(solve=solver.solve, refined_by=solver.refined_by), "undeclared")
+
+
+@pytest.mark.parametrize(
+    ("kind", "verdict", "words"),
+    [
+        (Exact, IDLE, "none is declared; undeclared solves free-flight"),
+        (HalfDrag, FAILED, "and its error is unknown"),
+        (MISTAKES["DragHalved"], FAILED, "declare the equation that it is meant to solve"),
+    ],
+)
+def test_a_solver_that_declares_no_equation_has_to_solve_one(kind, verdict, words):
+    (result,) = certify(undeclared(kind), ["equation"]).results
+    assert (result.verdict, words in result.line) == (verdict, True), result.line
+
+
+def test_where_one_equation_is_near_what_departs_from_it_is_named():
+    (result,) = certify(undeclared(MISTAKES["RestitutionLow"]), ["piecewise"]).results
+    assert result.verdict == FAILED
+    assert "(expected: free-flight, the nearest equation, from one output to the next)" in result.line
 
 
 @pytest.mark.parametrize(("drift", "verdict"), [(2e-6, WEAK), (5e-5, FAILED)])
