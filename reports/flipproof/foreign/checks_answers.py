@@ -158,15 +158,19 @@ def check_angle(traits: Traits) -> CheckGenerator:
     if holds and not stops and end_differs:
         calm = [ask_of(traits, replace(SLOW, gravity=0.0), 0, 961)]
         calm += [replace(ask_of(traits, calm[0].scenario, slow_level), times=slow_end_ask.times)]
-        ends = [float(answer.theta[-1]) for answer in (yield calm)]
-        weightless = abs(ends[1] - ends[0]) < 0.01 * abs(slow_end.theta[-1] - slow.theta[-1])
+        two_ask = replace(slow_end_ask, times=slow_ask.times[[len(slow_ask.times) // 2, -1]])
+        *ends, two_end = [float(answer.theta[-1]) for answer in (yield [*calm, two_ask])]
+        missed = abs(slow_end.theta[-1] - slow.theta[-1])
+        weightless = abs(ends[1] - ends[0]) < 0.01 * missed
         return Observation(
             holds=False,
             expected="the same theta, whatever other times are asked",
             observed=f"theta = {slow_end.theta[-1]:.4g} rad instead of {slow.theta[-1]:.4g} rad",
             where=f"flight of {SLOW.duration:g} s, asked at its end alone instead of at 961 times",
             advice=(elsewhere.right_without("weight") if weightless else "")
-            + _end_advice(slow_ask, slow_end.theta[-1] - slow.theta[-1], slow_end.theta[-1]),
+            + _end_advice(
+                slow_ask, slow_end.theta[-1], slow.theta[-1], first_alone=abs(two_end - slow.theta[-1]) < 0.01 * missed
+            ),
         )
     return Observation(
         holds=holds and not stops,
@@ -213,9 +217,14 @@ def _stale_advice(answer: Answer, step: float) -> str:
     return ""
 
 
-def _end_advice(ask: Ask, difference: float, theta: float) -> str:
-    """Return what to look at if theta [rad] at the end of a flight differs where that is the only time asked."""
-    turns = difference / (2 * np.pi)
+def _end_advice(ask: Ask, theta: float, right: float, *, first_alone: bool) -> str:
+    """Return what to look at if theta [rad] at the end of a flight is not ``right`` where no other time is asked.
+
+    ``first_alone`` says that it is right where an earlier time is asked, too.
+    """
+    turns = (theta - right) / (2 * np.pi)
+    if theta == ask.scenario.theta0 and first_alone:
+        return "the first answer is that of the release, whatever its time: the first of ask.times may come after 0"
     if theta == ask.scenario.theta0:
         return "theta is still theta_0: the flight begins at t = 0, not at the first of ask.times"
     if abs(turns - round(turns)) < 1e-3:

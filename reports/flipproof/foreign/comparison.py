@@ -229,6 +229,10 @@ def _unmatched(
     return max(misses, key=lambda miss: miss[0] / miss[1], default=None)
 
 
+LATE: Final = 0.05
+"""Fraction of the flight within which an impact of a slice, end and speed answered beside its time is that one."""
+
+
 def _listed_wrongly(ask: Ask, answered: Impacts, truth: Impacts) -> str:
     """Return which impacts a list lacks, has besides, or gives another slice or end; empty if not clear."""
     throw = ask.scenario
@@ -242,6 +246,14 @@ def _listed_wrongly(ask: Ask, answered: Impacts, truth: Impacts) -> str:
     for name, other in (("slice", "end"), ("end", "slice")):
         if named := [k for k in lacking if np.any(near[odd, k] & same[other][odd, k])]:
             return f"{len(named)} of {len(expected)} name another {name}"
+    alike = np.isclose(answered.speed_before[:, None], truth.speed_before, rtol=0.02, atol=0.0)
+    apart = answered.time[:, None] - truth.time
+    apart = np.where(same["slice"] & same["end"] & alike, apart, np.inf)[:, lacking]
+    if apart.size and np.all(np.min(np.abs(apart), axis=0) < LATE * throw.duration):
+        shifts = apart[np.argmin(np.abs(apart), axis=0), np.arange(len(lacking))]
+        side = "earlier" if np.all(shifts < 0.0) else "later" if np.all(shifts > 0.0) else "earlier or later"
+        size = f"{np.max(np.abs(shifts)):.2g} s {side} than they are"
+        return f"{len(lacking)} of {len(expected)} are answered up to {size}: answer the instant inside the step"
     if lacking:
         kinds = {
             "on the cap": truth.end == CAP,

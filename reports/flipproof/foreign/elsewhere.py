@@ -233,10 +233,11 @@ def bisected(
         )
         field_advice = _field_advice(comparison, ice=knobs.frozen)
         knobs_advice = "; or ".join(WORDS[name][1] for name in decisive)
+        enough = comparison.whole_turns or (field_advice and comparison.listed)
         return (
             f"{ice}right at {paper_words}, wrong at {throw_words} where other things are changed, too: {wrong_text}",
-            together or _impact_advice(comparison),
-            field_advice if comparison.whole_turns else f"{knobs_advice}{field_advice and f'; {field_advice}'}",
+            "" if enough else together or _impact_advice(comparison),
+            field_advice if enough else f"{knobs_advice}{field_advice and f'; {field_advice}'}",
         )
     return (
         f"{ice}{wrong_text} where {', '.join(knob_text(knobs, name) for name in names)}",

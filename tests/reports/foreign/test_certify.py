@@ -383,6 +383,14 @@ class FromTheFirst(Exact):
         return found | {"theta": found["theta"] - found["theta"][0] + ask.scenario.theta0}
 
 
+class FirstAtRelease(Exact):
+    """The first answer is that of the release."""
+
+    def solve(self, ask):
+        found = super().solve(ask)
+        return found | {"theta": np.append(ask.scenario.theta0, found["theta"][1:])}
+
+
 class TurnsBetweenOutputs(Exact):
     """The turns of theta are counted from one of the times asked to the next."""
 
@@ -404,6 +412,7 @@ class ThousandSteps(Exact):
     ("kind", "advice"),
     [
         (FromTheFirst, "theta is still theta_0: the flight begins at t = 0, not at the first of ask.times"),
+        (FirstAtRelease, "the first answer is that of the release, whatever its time"),
         (TurnsBetweenOutputs, "theta is off by whole turns: count them in every step"),
         (ThousandSteps, "look for a largest number of steps"),
     ],
@@ -640,6 +649,13 @@ def test_hits_on_both_ends_at_one_instant_are_asked_for_and_accuse_nobody():
 def test_impacts_are_held_to_the_reference_in_number_place_and_time(spoil, wrong):
     _, found = judged(type("Kind", (HitsReported,), {"spoil": staticmethod(spoil)}), WHOLE)
     assert set(found.wrong) == ({"impacts"} if wrong else set())
+
+
+@pytest.mark.parametrize(("offset", "side"), [(-2e-3, "earlier"), (1e-2, "later")])
+def test_impacts_beside_their_times_are_said_to_be_early_or_late(offset, side):
+    shifted = staticmethod(lambda rows: [(t + offset, *row) for t, *row in rows])
+    _, found = judged(type("Kind", (HitsReported,), {"spoil": shifted}), WHOLE)
+    assert f"are answered up to {abs(offset):.2g} s {side} than they are" in found.listed
 
 
 def test_slow_impacts_need_not_be_answered():
