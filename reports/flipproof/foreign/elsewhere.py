@@ -233,7 +233,7 @@ def bisected(
         )
         field_advice = _field_advice(comparison, ice=knobs.frozen)
         knobs_advice = "; or ".join(WORDS[name][1] for name in decisive)
-        enough = comparison.whole_turns or (field_advice and comparison.listed)
+        enough = comparison.whole_turns or (field_advice and set(comparison.wrong) == {"impacts"})
         return (
             f"{ice}right at {paper_words}, wrong at {throw_words} where other things are changed, too: {wrong_text}",
             "" if enough else together or _impact_advice(comparison),

@@ -144,14 +144,6 @@ class CappedEuler(MISTAKES["Euler"]):
         return super().steps(span, min(dt, 3e-4))
 
 
-class Carried(Subject):
-    """Theta drifts with the velocity of the launch."""
-
-    def solve(self, ask):
-        found = super().solve(ask)
-        return found | {"theta": found["theta"] + 1e-4 * ask.scenario.launch_velocity[0] * ask.times}
-
-
 class ThickEnds(Subject):
     """What is within 3 mm of an end touches it."""
 
@@ -170,17 +162,7 @@ class HitsReported(Subject):
         return super().solve(ask) | {"impacts": self.spoil(rows)}
 
 
-MINE = (
-    Overshoot,
-    InitialOmega,
-    EffortIgnored,
-    InertiaAboutTheCap,
-    HalfSpeed,
-    WeightBelowNine,
-    AlwaysHalf,
-    IceForward,
-    Carried,
-)
+MINE = (Overshoot, InitialOmega, EffortIgnored, InertiaAboutTheCap, HalfSpeed, WeightBelowNine, AlwaysHalf, IceForward)
 
 SEES = {
     "digits": "SinglePrecision",
@@ -198,7 +180,7 @@ SEES = {
     "equation": "NoDrag",
     "gravity": "WeightBelowNine",
     "mirror": "PositiveSpin",
-    "moving-frame": "Carried",
+    "moving-frame": "AirDrag",
     "order-before-impacts": "Euler",
 }
 """Check -> a mistake that it sees; "elsewhere" has tests of its own."""
@@ -243,6 +225,19 @@ def test_a_check_sees_the_mistake_it_is_there_for(check, mistake):
     (result,) = certify(InProcess(kind(), mistake), [check]).results
     assert result.verdict == FAILED
     assert result.observation.advice in result.line
+
+
+def test_a_launch_that_turns_theta_alone_is_seen():
+    class Carried(Subject):
+        """Theta drifts with the velocity of the launch."""
+
+        def solve(self, ask):
+            found = super().solve(ask)
+            return found | {"theta": found["theta"] + 1e-4 * ask.scenario.launch_velocity[0] * ask.times}
+
+    (result,) = certify(InProcess(Carried(), "carried"), ["moving-frame"]).results
+    assert result.verdict == FAILED
+    assert "theta changes by" in result.line
 
 
 def test_errors_that_do_not_fall_across_impacts_are_seen():
