@@ -155,9 +155,7 @@ def information_ratios(made: film_simulator.Clip, throw: Scenario) -> tuple[floa
     rate, e, omega0 = truth["gamma"] / truth["omega0"], truth["restitution"], truth["omega0"]
     nodes = [(rate, e), (rate * (1 + change), e), (rate * (1 - change), e), (rate, e + change), (rate, e - change)]
     curves = [
-        curve
-        for curve in Equation("free-flight", throw, 30.0).curves(np.array(nodes), omega0, truth["theta0"])
-        if curve
+        curve for curve in Equation("free-flight", throw).curves(np.array(nodes), omega0, truth["theta0"], 2.0) if curve
     ]
     spin = np.array([truth["release"], truth["theta0"] + np.radians(truth["tilt"]), omega0])
     film = made.film()

@@ -30,6 +30,10 @@ STEP: Final = 0.025
 DIFFERENCE: Final = 0.01
 """Relative change of omega_0, and change of theta_0 [rad], over which slopes of weighted equations are taken."""
 
+MIN_REACH: Final = 0.5
+MAX_REACH: Final = 60.0
+"""Bounds on the largest s of a curve [rad]."""
+
 TOGETHER: Final = 200
 """Throws that a scheme flies at once, of some hundred kilobytes each."""
 
@@ -53,7 +57,7 @@ class Curve:
     theta0: float = 0.0
 
     def at(self, s: FloatArray, omega0: float, theta0: float) -> FloatArray:
-        """Return F, F', R, dR/ds, and dF, dR by ln omega_0 and by theta_0, at s; shape (8, P).
+        """Return F, F' and R at s, and their slopes by s, by ln omega_0 and by theta_0; shape (4, 3, P).
 
         Before s = 0 the water rests.
         """
@@ -69,14 +73,12 @@ class Equation:
     ----------
     solver : str - a scheme of ``slicemodel``, a model of ``ode_reference`` or somebody else's
     throw : Scenario - bottle, water and gravity; its drag, restitution, omega0, theta0 and duration are not used
-    reach : float - largest s [rad]
     needs_r_cm : bool - whether the film needs r_CM
     tick : callable - called with the number of flights made
     """
 
     solver: str
     throw: Scenario
-    reach: float
     needs_r_cm: bool = True
     tick: Callable[[int], object] = field(default=lambda _: None, compare=False)
 
@@ -87,20 +89,22 @@ class Equation:
     def weighted(self) -> bool:
         """Whether weight affects the turning."""
         throw = self._throw(0.25, 0.5, 20.0, 1.0)
-        (with_weight,), (without_weight,) = self._fly([throw]), self._fly([replace(throw, gravity=0.0)])
+        with_weight, without_weight = self._fly([throw, replace(throw, gravity=0.0)], 2.0)
         return not np.allclose(with_weight, without_weight, rtol=0, atol=1e-9, equal_nan=True)
 
-    def curves(self, nodes: FloatArray, omega0: float, theta0: float) -> list[Curve | None]:
+    def curves(self, nodes: FloatArray, omega0: float, theta0: float, seconds: float) -> list[Curve | None]:
         """Return the curve of every (gamma / |omega_0|, e) in ``nodes`` (K, 2); None where the solver gave up.
 
         ``omega0`` and ``theta0`` (in the lab) are where slopes of a weighted equation are taken.
+        They last ``seconds``.
         """
+        reach = min(max(seconds * abs(omega0), MIN_REACH), MAX_REACH)
         if not self.weighted:
-            rows = self._fly([self._throw(rate, e, 20.0, 1.0) for rate, e in nodes])
+            rows = self._fly([self._throw(rate, e, 20.0, 1.0) for rate, e in nodes], reach)
             return [Curve(row) if np.isfinite(row).all() else None for row in rows]
         stencil = ((0, 0), (DIFFERENCE, 0), (-DIFFERENCE, 0), (0, DIFFERENCE), (0, -DIFFERENCE))
         throws = [self._throw(rate, e, omega0 * np.exp(a), theta0 + b) for rate, e in nodes for a, b in stencil]
-        flights = self._fly(throws).reshape(len(nodes), 5, 3, -1)
+        flights = self._fly(throws, reach).reshape(len(nodes), 5, 3, -1)
         slopes = (flights[:, 1::2] - flights[:, 2::2]) / (2 * DIFFERENCE)
         return [
             Curve(rows[0], slope, omega0, theta0) if np.isfinite(rows).all() else None
@@ -108,12 +112,13 @@ class Equation:
         ]
 
     def _throw(self, rate: float, e: float, omega0: float, theta0: float) -> Scenario:
-        throw = replace(self.throw, omega0=omega0, theta0=theta0, duration=self.reach / abs(omega0))
+        throw = replace(self.throw, omega0=omega0, theta0=theta0)
         return replace(throw, drag=2.0 * throw.slice_mass * rate * abs(omega0), restitution=e)
 
-    def _fly(self, throws: Sequence[Scenario]) -> FloatArray:
-        """Return F, F' and R of throws (K, 3, S); NaN from where a solver gave up."""
-        count = int(self.reach / STEP) + 1
+    def _fly(self, throws: Sequence[Scenario], reach: float) -> FloatArray:
+        """Return F, F' and R of throws (K, 3, S), up to s = ``reach``; NaN from where a solver gave up."""
+        throws = [replace(throw, duration=reach / abs(throw.omega0)) for throw in throws]
+        count = int(reach / STEP) + 1
         rows = np.full((len(throws), 3, count), np.nan)
         for k, (throw, flight) in enumerate(zip(throws, self._solve_all(throws, count), strict=True)):
             if flight is not None:

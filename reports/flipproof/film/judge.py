@@ -110,7 +110,7 @@ class Assessment:
         """theta and omega of the fitted flight at the film's frames, in the picture, each (P,)."""
         estimate, x = self.estimate, self.estimate.fit.x
         tilt = estimate.likelihood.tilt(x)
-        turned, rate, *_ = estimate.curve.at(abs(x[2]) * (estimate.film.t - x[0]), float(x[2]), float(x[1]) - tilt)
+        turned, rate, _ = estimate.curve.at(abs(x[2]) * (estimate.film.t - x[0]), float(x[2]), float(x[1]) - tilt)[0]
         return x[1] + np.sign(x[2]) * turned, x[2] * rate
 
     @cached_property

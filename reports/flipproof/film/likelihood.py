@@ -260,17 +260,16 @@ class Likelihood:
         if self.planar:
             values, slopes = points(turning, film.t, x, self.hands, KNOT_SPACING)
             return values, slopes
-        f, w, _, _, f_omega, _, f_theta, _ = turning
-        sign = np.sign(omega0)
-        theta, omega = theta0 + sign * f, omega0 * w
-        slopes = np.zeros((1, len(tau), 1, len(n)))
+        sign, slopes = np.sign(omega0), np.zeros((1, len(tau), 1, len(n)))
+        (f, w, _), (f_s, w_s, _), (f_omega, w_omega, _), (f_theta, w_theta, _) = turning
         if film.quantity == "theta":
-            turn = np.array([-omega, 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0])
+            turn = np.array([-omega0 * f_s, 1.0 + sign * f_theta, f_s * tau + sign * f_omega / omega0])
             slopes[0, :, 0, :3] = turn.T
-            return theta[None, :, None], slopes
-        acceleration = np.gradient(omega, film.t) if len(tau) > 1 else np.zeros_like(omega)
-        slopes[0, :, 0, 0], slopes[0, :, 0, 2] = -acceleration, w + acceleration * tau / omega0
-        return omega[None, :, None], slopes
+            return (theta0 + sign * f)[None, :, None], slopes
+        spin = abs(omega0)
+        turn = np.array([-omega0 * spin * w_s, omega0 * w_theta, w + spin * tau * w_s + w_omega])
+        slopes[0, :, 0, :3] = turn.T
+        return (omega0 * w)[None, :, None], slopes
 
     def variance(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the variance of one coordinate (P,), and its slopes by the inner parameters (P, K)."""

@@ -17,34 +17,39 @@ QUICK = 0.05
 
 @kept_on_disk()
 def curve_at(rows, slopes, step, offset, s):
-    """Return F, F', R, dR/ds, and dF, dR by ln omega_0 and by theta_0, at s (P,); shape (8, P).
+    """Return F, F' and R at s (P,), and their slopes by s, by ln omega_0 and by theta_0; shape (4, 3, P).
 
     ``rows`` (3, S) are ``step`` apart; ``slopes`` is (2, 3, S), or (0, 3, S) of an equation without weight; ``offset``
     (2,) is how far ln omega_0 and theta_0 are from where the slopes were taken. The water rests before s = 0; after the
     last row the bottle turns on evenly.
     """
-    values = np.zeros((8, len(s)))
+    values = np.zeros((4, 3, len(s)))
     last = rows.shape[1] - 2
     for i in range(len(s)):
         if s[i] < 0.0:
-            values[0, i], values[1, i], values[2, i] = s[i], 1.0, rows[2, 0]
+            values[0, :, i] = s[i], 1.0, rows[2, 0]
+            values[1, 0, i] = 1.0
             continue
         k = min(int(s[i] / step), last)
         x = min(s[i] / step - k, 1.0)
         y = 1.0 - x
-        w0, w1 = rows[1, k], rows[1, k + 1]
-        rise = rows[0, k + 1] - rows[0, k]
         beyond = max(s[i] - step * (last + 1), 0.0)
-        values[0, i] = rows[0, k] + x * rise + x * y * (y * (step * w0 - rise) - x * (step * w1 - rise)) + beyond * w1
-        values[1, i] = y * w0 + x * w1
-        values[2, i] = y * rows[2, k] + x * rows[2, k + 1]
-        values[3, i] = (rows[2, k + 1] - rows[2, k]) / step
+        for row in range(3):
+            low, high = rows[row, k], rows[row, k + 1]
+            values[0, row, i] = y * low + x * high
+            values[1, row, i] = (high - low) / step if beyond == 0.0 else 0.0
+        # F is the cubic of both its values and both angular velocities.
+        rise = rows[0, k + 1] - rows[0, k]
+        first, second = step * rows[1, k] - rise, step * rows[1, k + 1] - rise
+        bend = y * first - x * second
+        values[0, 0, i] += x * y * bend + beyond * rows[1, k + 1]
+        values[1, 0, i] = (rise + (y - x) * bend - x * y * (first + second)) / step
         for d in range(slopes.shape[0]):
             for row in range(3):
-                slope = y * slopes[d, row, k] + x * slopes[d, row, k + 1]
-                values[row, i] += offset[d] * slope
-                if row != 1:
-                    values[4 + 2 * d + row // 2, i] = slope
+                low, high = slopes[d, row, k], slopes[d, row, k + 1]
+                values[2 + d, row, i] = y * low + x * high
+                values[0, row, i] += offset[d] * values[2 + d, row, i]
+                values[1, row, i] += offset[d] * (high - low) / step if beyond == 0.0 else 0.0
     return values
 
 
@@ -59,7 +64,8 @@ def points(turning, t, x, hands, spacing):
     omega0, length, count, last = x[2], x[9], (len(x) - 12) // 3, hands.shape[1] - 2
     sign = math.copysign(1.0, omega0)
     for i in range(len(t)):
-        f, w, r, dr, f_omega, r_omega, f_theta, r_theta = turning[:, i]
+        f, f_s, f_omega, f_theta = turning[:, 0, i]
+        r, r_s, r_omega, r_theta = turning[:, 2, i]
         tau = t[i] - x[0]
         hand_offset, hand_rate, basis = np.zeros(3), np.zeros(3), np.zeros(count)
         if tau < 0.0:
@@ -76,8 +82,10 @@ def points(turning, t, x, hands, spacing):
         u = (math.sin(theta), -math.cos(theta))
         normal = (-u[1], u[0])
         # Slopes of theta and R by release, theta_0 and omega_0.
-        angle_slope = (-omega0 * w - hand_rate[2], 1.0 + sign * f_theta, w * tau + sign * f_omega / omega0)
-        radius_slope = (-abs(omega0) * dr, r_theta, sign * dr * tau + r_omega / omega0)
+        angle_slope = (-omega0 * f_s - hand_rate[2], 1.0 + sign * f_theta, f_s * tau + sign * f_omega / omega0)
+        radius_slope = (-abs(omega0) * r_s, r_theta, sign * r_s * tau + r_omega / omega0)
+        # The direction of gravity in the picture changes the bottle's angle to it.
+        tilt_slope = (x[8] / (x[7] ** 2 + x[8] ** 2), -x[7] / (x[7] ** 2 + x[8] ** 2))
         for body in range(2):
             along = body - r
             for d in range(2):
@@ -88,7 +96,10 @@ def points(turning, t, x, hands, spacing):
                 for k in range(3):
                     slope[k] = length * (along * angle_slope[k] * normal[d] - radius_slope[k] * u[d])
                 slope[0] -= x[5 + d] + tau * x[7 + d] + hand_rate[d]
-                slope[3 + d], slope[5 + d], slope[7 + d] = 1.0, tau, 0.5 * tau**2
+                slope[3 + d], slope[5 + d] = 1.0, tau
+                for k in range(2):
+                    slope[7 + k] = length * (along * sign * f_theta * normal[d] - r_theta * u[d]) * tilt_slope[k]
+                slope[7 + d] += 0.5 * tau**2
                 slope[9] = along * u[d]
                 for m in range(count):
                     slope[10 + 3 * m + d] = basis[m]
