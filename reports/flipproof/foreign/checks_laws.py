@@ -288,12 +288,14 @@ def check_equation(traits: Traits) -> CheckGenerator:
     if traits.equation is None and place.on_lattice:
         raise NotApplicableError(f"none is declared; {place.text}", {"place": place.to_mapping()})
     if traits.equation is None:
+        simpler = (yield from elsewhere.simpler_throws_advice(traits, place.followed)) if place.followed else ""
         return Observation(
             holds=False,
             expected="an equation of the ladder; none is declared",
             observed=place.text,
             where=WHERE_PLACED,
-            advice="declare the equation that it is meant to solve (solve.equation, or --equation) to be told where it "
+            advice=(f"it follows {place.followed} the longest: {simpler}" if simpler else "")
+            + "declare the equation that it is meant to solve (solve.equation, or --equation) to be told where it "
             "departs from it; if it is meant to solve another, declare that as an expected failure",
             facts={"place": place.to_mapping()},
         )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from statistics import median_low
 from typing import Any, Final
 
 import numpy as np
@@ -168,21 +169,22 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         return (yield from _changes_alike(traits))
     declared = _order_of(traits)
     # Few and long steps: at short ones an order of 4 or more drowns in round-off. Low orders show only at short ones.
-    # The order is a limit for short steps: the best of the ratios counts.
+    # The order is a limit for short steps: the best of the ratios counts, but that of a few times may be chance.
     levels = range(-8, -2) if declared > 2 else range(-4, 0)
     required = declared - ORDER_ROOM
-    for fractions in (FRACTIONS[:1], FRACTIONS):
+    for fractions, of_ratios in ((FRACTIONS[:1], median_low), (FRACTIONS, max)):
         changes = yield from _changes_before(traits, SMOOTH, levels, fractions)
-        orders = _orders(traits, changes)
+        orders = _orders(traits, changes, of_ratios)
         if not orders:
             raise NotApplicableError(f"changes under refinement are round-off, {max(changes['omega']):.2g} of omega_0")
         worst = min(orders, key=lambda name: orders[name])
         if orders[worst] >= required:
             break
+    low, right = ([name for name, order in orders.items() if (order < required) == below] for below in (True, False))
     where = f"0.05 s in which the equation has no impact, steps of {'13' if declared > 2 else '0.8'} ms and its halves"
     observed, advice, calm = f"{orders[worst]:.2f} ({worst})", "", ""
     if holds := orders[worst] >= required:
-        for fractions in (FRACTIONS[1:2], FRACTIONS[1:]):
+        for fractions, of_ratios in ((FRACTIONS[1:2], median_low), (FRACTIONS[1:], max)):
             uneven_changes = yield from _changes_before(traits, SMOOTH, levels, fractions, uneven=True)
             # Output times shorten steps, so that a right answer changes less; where something else limits the step,
             # only they change it, and such levels do not count.
@@ -190,7 +192,7 @@ def check_order_before(traits: Traits) -> CheckGenerator:
                 name: [size if size > 2 * even > 0.0 else 0.0 for even, size in zip(changes[name], sizes, strict=True)]
                 for name, sizes in uneven_changes.items()
             }
-            uneven = _orders(traits, counted)
+            uneven = _orders(traits, counted, of_ratios)
             worst_uneven = min(uneven, key=lambda name: uneven[name], default="")
             holds = not worst_uneven or uneven[worst_uneven] >= required
             if holds:
@@ -207,7 +209,8 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         end_orders = _orders(traits, (yield from _changes_before(traits, SMOOTH, levels, ((1.0,),))))
         if end_orders and min(end_orders.values()) >= required:
             advice = "of that order where the end alone is asked: look at how an answer between two steps is made"
-        for name, throw in CALM.items() if not advice else ():
+        answered_low = "r" in right  # the motion is of that order
+        for name, throw in CALM.items() if not (advice or answered_low) else ():
             orders_without = _orders(traits, (yield from _changes_before(traits, throw, levels)))
             low_without = [field for field, order in orders_without.items() if order < required]
             if name == "weight" and low_without == ["theta"] and sum(order < required for order in orders.values()) > 1:
@@ -217,7 +220,7 @@ def check_order_before(traits: Traits) -> CheckGenerator:
             if orders_without and min(orders_without.values()) >= required:
                 calm = name
                 break
-        if not advice:
+        if not (advice or answered_low):
             orders_inside = _orders(traits, (yield from _changes_before(traits, SMOOTH, levels, inside=True)))
             flying = bool(orders_inside) and min(orders_inside.values()) >= required
             if flying:
@@ -229,7 +232,6 @@ def check_order_before(traits: Traits) -> CheckGenerator:
                     f"of that order without {calm}: look at the instant of {elsewhere.LOOK_AT[calm]}, and whether an "
                     "iteration with it converges"
                 )
-    low, right = ([name for name, order in orders.items() if (order < required) == below] for below in (True, False))
     if low and right:
         default_advice = (
             f"{', '.join(right)} of that order: look at how {' and '.join(low)} is advanced in a step, and answered"
@@ -305,14 +307,17 @@ def _changes_before(
     """
     changes: dict[str, list[list[float]]] = {}
     start = far_from_ends(throw) if inside else throw.initial_positions()
-    for common in throw.duration * np.array(fractions):
-        asks = [replace(ask_of(traits, throw, level), times=common, start=start) for level in levels]
-        if uneven:
-            asks = [
-                replace(ask, times=np.union1d(common, _uneven_times(throw.duration, 960.0 / 1.2 * 2.0**level)))
-                for ask, level in zip(asks, levels, strict=True)
-            ]
-        answers = yield asks
+    compared = throw.duration * np.array(fractions)
+    asks = []
+    for common in compared:
+        for level in levels:
+            times = common
+            if uneven:
+                times = np.union1d(common, _uneven_times(throw.duration, 960.0 / 1.2 * 2.0**level))
+            asks.append(replace(ask_of(traits, throw, level), times=times, start=start))
+    all_answers = yield asks
+    for k, common in enumerate(compared):
+        answers = all_answers[k * len(levels) : (k + 1) * len(levels)]
         for name in FIELDS:
             if getattr(answers[0], name) is not None:
                 values = [getattr(answer, name)[np.searchsorted(answer.t, common)] for answer in answers]
@@ -320,13 +325,15 @@ def _changes_before(
     return {name: np.sqrt(np.mean(np.square(sizes), axis=0)).tolist() for name, sizes in changes.items()}
 
 
-def _orders(traits: Traits, changes: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the best observed order by field, omitted where changes are round-off."""
+def _orders(
+    traits: Traits, changes: Mapping[str, Sequence[float]], of_ratios: Callable[[Sequence[float]], float] = max
+) -> dict[str, float]:
+    """Return the best observed order by field, or another of them; omitted where changes are round-off."""
     floor = max(ROUNDOFF, 64 * traits.epsilon)
     ratios = {
         name: [math.log2(a / b) for a, b in pairwise(sizes) if min(a, b) > floor] for name, sizes in changes.items()
     }
-    return {name: max(values) for name, values in ratios.items() if values}
+    return {name: of_ratios(values) for name, values in ratios.items() if values}
 
 
 def _uneven_times(end: float, pairs: float) -> FloatArray:
@@ -439,17 +446,18 @@ CROWDED: Final = replace(RESTLESS, slices=20)
 def check_piecewise(traits: Traits) -> CheckGenerator:
     """From the solver's own state at each output the equation leads to the next."""
     place = yield from placing(traits)
-    equation = traits.equation or place.equation
+    equation = traits.equation or (place.equation if place.on_lattice else place.followed)
+    if not equation or (traits.equation is None and not place.on_lattice and place.change is None):
+        raise NotApplicableError("no equation is declared")
     declared = name_of(switches_of(equation))
     if place.on_lattice and place.equation != declared:
         raise NotApplicableError("told by the check of the equation")
-    if traits.equation is None and not (place.on_lattice or (place.clear and place.change is not None)):
-        raise NotApplicableError("no equation is declared")
+    which = ", the nearest equation," if place.on_lattice else ", the equation that it follows the longest,"
     asks = [knobs.ask(0) for knobs in PIECES]
     departure, advice = yield from departures.departing(traits, declared, asks, [CROWDED.ask(0)])
     return Observation(
         holds=not departure,
-        expected=f"{declared}{'' if traits.equation else ', the nearest equation,'} from one output to the next",
+        expected=f"{declared}{'' if traits.equation else which} from one output to the next",
         observed=f"departs {departure}" if departure else "no departure beyond the step's own error",
         where=f"{len(asks)} throws, begun anew from the solver's own state at each of {departures.OUTPUTS} outputs",
         advice=advice,
@@ -560,7 +568,11 @@ def check_restitution(traits: Traits) -> CheckGenerator:
     if stuck:
         expected += f", for slow impacts, too: a rest begins below omega_0 L / {1 / MAX_REST:.0f}"
         observed, where = f"none where a slice would leave {stuck}", "slices let go near the ends, no weight, no drag"
-        advice = "look at the speed below which a slice rests on its end"
+        advice = (
+            "already before it strikes it is on that end: begin at ask.start, wherever that is"
+            if stuck.endswith(PUT_ON_END)
+            else "look at the speed below which a slice rests on its end"
+        )
     elif not wrong:
         speeds = [r.speed for r in rebounds]
         observed += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
@@ -591,6 +603,9 @@ def check_restitution(traits: Traits) -> CheckGenerator:
 MAX_REST: Final = 1e-4
 """Speed after an impact below which a slice may rest on its end, fraction of omega_0 L."""
 
+PUT_ON_END: Final = ": it is there from the release on"
+"""What ends the text of a slice that is put onto the end near which it begins."""
+
 SLOW: Final = 3e-3 * 2.0 ** np.arange(6)
 """Speeds of slow impacts on the base, fraction of omega_0 L; those on the cap are a third faster."""
 
@@ -614,16 +629,20 @@ def _stuck(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], str]:
     heights = RESTITUTION**2 * distance * (1 - phases[:, None, None] ** 2)
     throw = replace(throw, duration=1.1 * float(aloft.max()))
     start = (ends + np.array([-1.0, 1.0]) * distance).ravel()
-    (answer,) = yield [replace(ask_of(traits, throw, 2), times=np.unique(aloft), start=start)]
+    falling = struck / 2
+    times = np.union1d(falling, aloft)
+    (answer,) = yield [replace(ask_of(traits, throw, 2), times=times, start=start)]
     assert answer.r is not None
     rows = np.searchsorted(answer.t, aloft)
     answered = np.abs(answer.r[rows, np.arange(shares.size).reshape(shares.shape)] - ends)
     right = (np.abs(answered - heights) < 0.05 * heights).all(axis=0)
     stuck = (answered < 0.1 * heights).all(axis=0) & (heights[1] > 1000 * traits.epsilon * throw.bottle.length)
+    before = np.abs(answer.r[np.searchsorted(answer.t, falling), np.arange(shares.size).reshape(shares.shape)] - ends)
     for rebound, end in np.argwhere(stuck[:-1] & right[1:])[::-1]:
         share = RESTITUTION * shares[rebound, end]
         speed = share * throw.omega0 * throw.bottle.length
-        return f"the {('base', 'cap')[end]} at {share:.2g} omega_0 L, {speed:.2g} m/s"
+        place = f"the {('base', 'cap')[end]} at {share:.2g} omega_0 L, {speed:.2g} m/s"
+        return place + (PUT_ON_END if before[rebound, end] < 0.1 * distance[rebound, end] else "")
     return ""
 
 

@@ -243,9 +243,13 @@ def _listed_wrongly(ask: Ask, answered: Impacts, truth: Impacts) -> str:
     exact = near & same["slice"] & same["end"]
     odd = ~exact.any(axis=1) & (answered.speed_before > fast)
     lacking = [int(k) for k in expected if not exact[:, k].any()]
-    for name, other in (("slice", "end"), ("end", "slice")):
-        if named := [k for k in lacking if np.any(near[odd, k] & same[other][odd, k])]:
-            return f"{len(named)} of {len(expected)} name another {name}"
+    named = {
+        name: sum(bool(np.any(near[odd, k] & same[other][odd, k])) for k in lacking)
+        for name, other in (("slice", "end"), ("end", "slice"))
+    }
+    name = max(named, key=lambda field: named[field])
+    if named[name]:
+        return f"{named[name]} of {len(expected)} name another {name}"
     alike = np.isclose(answered.speed_before[:, None], truth.speed_before, rtol=0.02, atol=0.0)
     apart = answered.time[:, None] - truth.time
     apart = np.where(same["slice"] & same["end"] & alike, apart, np.inf)[:, lacking]

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from flipproof.foreign.checking import WRAPPED, CheckGenerator, NotApplicableError, Observation
+from flipproof.foreign.checking import WRAPPED, CheckGenerator, NotApplicableError, Observation, effort_of
 from flipproof.foreign.comparison import (
     AT_ONCE,
     FAINT,
@@ -33,6 +33,7 @@ from flipproof.foreign.place import name_of, placing, switches_of
 from flipproof.foreign.throws import (
     FEW_IMPACTS,
     FULL,
+    LONG,
     NARROW,
     PAPER,
     RESTLESS,
@@ -45,6 +46,7 @@ from flipproof.foreign.throws import (
     drawn,
     shortened,
 )
+from flipproof.frame.solvers import solve
 
 UNREFINED: Final = 0.003
 """Own error, fraction of omega_0, granted on ``WHOLE`` to a solver that cannot be refined."""
@@ -109,6 +111,7 @@ DENSE: Final = 2000
 
 def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
     """Other bottles, fillings, slices, starts, spins and times: every field is that of the equation."""
+    long_answer = yield from _long_answer(traits)  # asked at once, to spare answers by files one round
     place = yield from placing(traits)
     equation = traits.equation or place.equation
     if not place.on_lattice or place.equation != name_of(switches_of(equation)):
@@ -153,6 +156,16 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
     if full.wrong and not in_turn and not wrong:
         wrong = [(FULL, full)]
     if not wrong:
+        cut = _where_a_list_ends(long_answer, equation) if long_answer else ""
+        if cut:
+            return Observation(
+                holds=False,
+                expected="all impacts listed, to the end of the flight",
+                observed=cut,
+                where=f"{LONG.slices} slices, {LONG.angle:g} rad turned, thrown besides",
+                advice="look for a largest number of impacts, in the list or of the flight: neither may have one",
+                facts=facts,
+            )
         largest = max(comparison.largest for _, comparison in flights)
         blurred = sum(comparison.share < 0.3 for _, comparison in flights)
         weak = own_error > WEAK or blurred > len(flights) // 2
@@ -185,6 +198,40 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
     advice = f"{impacts}{advice}".removesuffix("; ")
     where = "a full bottle, thrown besides" if wrong[0][0] is FULL else f"{len(wrong)} of {len(flights)} throws"
     return Observation(holds=False, expected=expected, observed=observed, where=where, advice=advice, facts=facts)
+
+
+def _long_answer(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Answer | None]:
+    """Return the answer to ``LONG`` at eleven times; None if there is none."""
+    ask = LONG.ask(0)
+    times = np.linspace(0.0, ask.scenario.duration, 11)
+    try:
+        (answer,) = yield [replace(ask, times=times, effort=effort_of(traits, ask.scenario, 0))]
+    except ForeignError:  # so many impacts may take it too long
+        return None
+    return answer
+
+
+def _where_a_list_ends(answer: Answer, equation: str) -> str:
+    """Return from when on a list lacks most of the many impacts of ``LONG``; empty if it does not, or there is none.
+
+    Such a flight cannot be compared impact by impact, but their number in a tenth of it hardly changes.
+    """
+    throw = LONG.ask(0).scenario
+    truth = solve(switches_of(equation).name, throw, times=answer.t).impacts
+    if answer.impacts is None or truth is None:
+        return ""
+    fast = FAINT * throw.bottle.length * abs(throw.omega0)
+    listed, true = (
+        np.histogram(impacts.time[impacts.speed_before > fast], answer.t)[0] for impacts in (answer.impacts, truth)
+    )
+    lacking = np.flatnonzero(listed < true / 3)
+    if not len(lacking):
+        return ""
+    k = int(lacking[0])
+    return (
+        f"{len(answer.impacts)} impacts are listed, but {len(truth)} expected: {listed[k]} from t = {answer.t[k]:.3g} "
+        f"to {answer.t[k + 1]:.3g} s, about {true[k]} expected"
+    )
 
 
 def bisected(

@@ -74,6 +74,7 @@ class Place:
     room : float - distance that the solver's own error explains, fraction of omega_0
     following : str, and following_distance : float - the next different equation
     inert : tuple of str - switches without effect in the nearest equation
+    followed : str - the equation that omega follows the longest; empty if it soon departs from all or leaves two alike
     still : bool - omega never changes by more than ``moved``: nothing moves inside the bottle
     """
 
@@ -86,6 +87,7 @@ class Place:
     following: str
     following_distance: float
     inert: tuple[str, ...]
+    followed: str
     still: bool
     moved: float
 
@@ -221,6 +223,7 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
             for field in fields(Switches)
             if canonical(replace(nearest, **{field.name: not getattr(nearest, field.name)})) == nearest
         ),
+        followed=_followed(curves, references, rooms),
         still=moved <= max(1e-9, 64 * traits.epsilon, SURE * (change or 0.0)),
         moved=moved,
     )
@@ -229,6 +232,22 @@ def placing(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Place]
 def _differences(curves: tuple[FloatArray, ...], others: tuple[FloatArray, ...]) -> list[float]:
     """Return the largest difference of two solvers on each throw."""
     return [float(np.max(np.abs(a - b))) for a, b in zip(curves, others, strict=True)]
+
+
+def _followed(
+    curves: tuple[FloatArray, ...], references: Mapping[Switches, tuple[FloatArray, ...]], rooms: Sequence[float]
+) -> str:
+    """Return the equation within ``rooms`` of which all throws begin, the longest; empty if that is not clear."""
+    lengths = {
+        switches: sum(
+            int(np.argmax(np.append(np.abs(curve - other) > room, True)))
+            for curve, other, room in zip(curves, reference, rooms, strict=True)
+        )
+        for switches, reference in references.items()
+    }
+    longest, following = sorted(lengths, key=lambda switches: -lengths[switches])[:2]
+    long = lengths[longest] > sum(map(len, curves)) / 4
+    return name_of(longest) if long and lengths[longest] > lengths[following] else ""
 
 
 def _room(change: float | None, following: float, epsilon: float) -> float:

@@ -932,10 +932,10 @@ def test_a_solver_that_declares_no_equation_has_to_solve_one(kind, verdict, word
     assert (result.verdict, words in result.line) == (verdict, True), result.line
 
 
-def test_where_one_equation_is_near_what_departs_from_it_is_named():
+def test_where_one_equation_is_followed_long_what_departs_from_it_is_named():
     (result,) = certify(undeclared(MISTAKES["RestitutionLow"]), ["piecewise"]).results
     assert result.verdict == FAILED
-    assert "(expected: free-flight, the nearest equation, from one output to the next)" in result.line
+    assert "(expected: free-flight, the equation that it follows the longest, from one output to" in result.line
 
 
 @pytest.mark.parametrize(("drift", "verdict"), [(2e-6, WEAK), (5e-5, FAILED)])
