@@ -33,7 +33,7 @@ from flipproof.foreign.place import name_of, placing, switches_of
 from flipproof.foreign.throws import (
     FEW_IMPACTS,
     FULL,
-    LONG,
+    LASTING,
     NARROW,
     PAPER,
     RESTLESS,
@@ -105,6 +105,9 @@ SIMILAR: Final[Mapping[Knobs, tuple[Knobs, str, str]]] = MappingProxyType(
 )
 """Throws that differ from one of these in its scale or room alone: how wrong is told from right, and the advice."""
 
+MANY: Final = 20
+"""Impacts in a tenth of ``LASTING`` of which a third is no chance."""
+
 DENSE: Final = 2000
 """Output times of a throw that is asked once more at many."""
 
@@ -162,7 +165,7 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
                 holds=False,
                 expected="all impacts listed, to the end of the flight",
                 observed=cut,
-                where=f"{LONG.slices} slices, {LONG.angle:g} rad turned, thrown besides",
+                where=f"{LASTING.slices} slices, {LASTING.angle:g} rad turned, thrown besides",
                 advice="look for a largest number of impacts, in the list or of the flight: neither may have one",
                 facts=facts,
             )
@@ -201,8 +204,8 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
 
 
 def _long_answer(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Answer | None]:
-    """Return the answer to ``LONG`` at eleven times; None if there is none."""
-    ask = LONG.ask(0)
+    """Return the answer to ``LASTING`` at eleven times; None if there is none."""
+    ask = LASTING.ask(0)
     times = np.linspace(0.0, ask.scenario.duration, 11)
     try:
         (answer,) = yield [replace(ask, times=times, effort=effort_of(traits, ask.scenario, 0))]
@@ -212,11 +215,11 @@ def _long_answer(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], A
 
 
 def _where_a_list_ends(answer: Answer, equation: str) -> str:
-    """Return from when on a list lacks most of the many impacts of ``LONG``; empty if it does not, or there is none.
+    """Return from when on a list lacks most of the many impacts of ``LASTING``; empty if it does not, or there is none.
 
     Such a flight cannot be compared impact by impact, but their number in a tenth of it hardly changes.
     """
-    throw = LONG.ask(0).scenario
+    throw = LASTING.ask(0).scenario
     truth = solve(switches_of(equation).name, throw, times=answer.t).impacts
     if answer.impacts is None or truth is None:
         return ""
@@ -224,7 +227,7 @@ def _where_a_list_ends(answer: Answer, equation: str) -> str:
     listed, true = (
         np.histogram(impacts.time[impacts.speed_before > fast], answer.t)[0] for impacts in (answer.impacts, truth)
     )
-    lacking = np.flatnonzero(listed < true / 3)
+    lacking = np.flatnonzero((listed < true / 3) & (true >= MANY))
     if not len(lacking):
         return ""
     k = int(lacking[0])

@@ -153,7 +153,7 @@ FULL: Final = replace(PAPER, mass=0.05, filling=1.0, damping=0.0, gravity=0.0, t
 Where the tube recoils, rounding decides whether a solver applies these hits together or in turn: neither is wrong.
 """
 
-LONG: Final = replace(PAPER, slices=16, restitution=0.95, damping=0.0, angle=150.0)
+LASTING: Final = replace(PAPER, slices=16, restitution=0.95, damping=0.0, angle=150.0)
 """Seven hundred impacts, about as many in each tenth of the flight."""
 
 SMALL: Final = replace(

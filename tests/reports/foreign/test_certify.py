@@ -27,15 +27,16 @@ from flipproof.foreign.certify import CHECKS, EXPECTED, FAILED, IDLE, PASSED, WE
 from flipproof.foreign.checking import drive
 from flipproof.foreign.checks_measured import CROWDED
 from flipproof.foreign.comparison import comparing, confirmed
-from flipproof.foreign.contract import IMPACT, Ask, ForeignError, LateError, started
+from flipproof.foreign.contract import IMPACT, Answer, Ask, ForeignError, LateError, started
 from flipproof.foreign.departures import departing
-from flipproof.foreign.elsewhere import simpler_throws_advice
+from flipproof.foreign.elsewhere import _where_a_list_ends, simpler_throws_advice
 from flipproof.foreign.place import name_of, switches_of
 from flipproof.foreign.solving import opened
 from flipproof.foreign.throws import (
     COUNT,
     FACTORS,
     FULL,
+    LASTING,
     PAPER,
     PIECES,
     SEED,
@@ -51,6 +52,7 @@ from flipproof.output.junit import junit_text
 from flipproof.testing import parametrize_with_checks
 from slicemodel import Scenario
 from slicemodel.observables import moment_of_inertia
+from slicemodel.trajectory import Impacts
 
 
 class Exact(made_up.Exact):
@@ -930,6 +932,19 @@ def undeclared(kind):
 def test_a_solver_that_declares_no_equation_has_to_solve_one(kind, verdict, words):
     (result,) = certify(undeclared(kind), ["equation"]).results
     assert (result.verdict, words in result.line) == (verdict, True), result.line
+
+
+def test_where_a_list_ends_is_told_only_where_many_impacts_lack():
+    """The number of impacts in a tenth of a long flight hardly changes, whichever come first."""
+    throw = LASTING.ask(0).scenario
+    times = np.linspace(0.0, throw.duration, 11)
+    exact = solve("free-flight", throw, times=times).impacts
+    answer = Answer(t=times, theta=times, omega=times, impacts=exact)
+    assert _where_a_list_ends(answer, "free-flight") == _where_a_list_ends(answer, "eq8") == ""
+    first = Impacts(**{name: getattr(exact, name)[:200] for name in IMPACT})
+    text = _where_a_list_ends(replace(answer, impacts=first), "free-flight")
+    assert text.startswith(f"200 impacts are listed, but {len(exact)} expected"), text
+    assert _where_a_list_ends(replace(answer, impacts=None), "free-flight") == ""
 
 
 def test_where_one_equation_is_followed_long_what_departs_from_it_is_named():
