@@ -2,6 +2,7 @@
 
     python benchmarks/films.py [--films 20] [--first 0] [--slices 6]      coverage, one line a cell
     python benchmarks/films.py --films 4 --soft 10                        the same on a table that takes 10 ms
+    python benchmarks/films.py --films 1 --equation eq8                   the same, flown and fitted by Eq. 8
     python benchmarks/films.py --spoiled 500 --noise 200                  spoiled and random films: no traceback
     python benchmarks/films.py --late 20                                  late releases, seen without an equation
     python benchmarks/films.py --given 5          widths of intervals, over those with the true release given, and
@@ -50,14 +51,14 @@ def cells() -> list[dict[str, Any]]:
     return found
 
 
-def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int, softness: float = 0.0) -> film_simulator.Clip:
-    """Return a film of a cell with a truth drawn anew."""
+def drawn(rng: np.random.Generator, cell: dict[str, Any], slices: int, **options: Any) -> film_simulator.Clip:
+    """Return a film of a cell with a truth drawn anew; ``options`` are the simulator's."""
     truth: dict[str, Any] = {"gamma": rng.uniform(2, 10), "e": rng.uniform(0.1, 0.8), "omega0": rng.uniform(14, 22)}
-    return film_simulator.film(rng, slices=slices, swings=True, softness=softness, **cell, **truth)
+    return film_simulator.film(rng, slices=slices, swings=True, **cell, **truth, **options)
 
 
-def coverage(films: int, first: int, slices: int, only: list[int], softness: float) -> None:
-    """Print for every cell how many intervals hold the truth, and their median width."""
+def coverage(films: int, first: int, slices: int, only: list[int], equation: str, softness: float) -> None:
+    """Print by cell how many intervals hold the truth, and their median width; an equation flies and fits the films."""
     total: Counter[tuple[str, str]] = Counter()
     for index, cell in enumerate(cells()):
         if only and cell["fps"] not in only:
@@ -66,10 +67,10 @@ def coverage(films: int, first: int, slices: int, only: list[int], softness: flo
         widths: dict[str, list[float]] = {name: [] for name in COUNTED}
         began = time.process_time()
         for k in range(first, first + films):
-            made = drawn(np.random.default_rng([index, k]), cell, slices, softness)
+            made = drawn(np.random.default_rng([index, k]), cell, slices, model=equation, softness=softness)
             throw = Scenario(water_mass=cell["filling"]).with_slices(slices)
             try:
-                judged = Assessment(estimate(made.film(), throw))
+                judged = Assessment(estimate(made.film(), throw, equation))
                 judged.check()
             except ValueError as error:
                 refused += 1
@@ -199,6 +200,7 @@ if __name__ == "__main__":
     for name in ("films", "first", "slices", "spoiled", "noise", "late", "given"):
         parser.add_argument(f"--{name}", type=int, default={"films": 20, "slices": 6}.get(name, 0))
     parser.add_argument("--fps", type=int, nargs="*", default=[], help="cells of these frame rates alone")
+    parser.add_argument("--equation", default="free-flight", help="by which films are flown and fitted")
     parser.add_argument("--soft", type=float, default=0.0, help="time in which the table takes velocity and spin [ms]")
     options = parser.parse_args()
     if options.late:
@@ -208,4 +210,4 @@ if __name__ == "__main__":
     elif options.spoiled or options.noise:
         rough(options.spoiled, options.noise, options.first, options.slices)
     else:
-        coverage(options.films, options.first, options.slices, options.fps, options.soft / 1e3)
+        coverage(options.films, options.first, options.slices, options.fps, options.equation, options.soft / 1e3)
