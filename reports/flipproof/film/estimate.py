@@ -473,10 +473,9 @@ def _best_start(
     likely = [guess[1:] for guess in starts if guess[0] <= starts[0][0] + MAX_GUESS_EXCESS]
     turning = max(abs(float(x[2])) * _seconds(start, x) for start, x in likely)
     for start, x in likely:
-        if equation.weighted:
-            solved = equation.curves(rates, float(x[2]), float(x[1]), _seconds(start, x))
-        elif not solved:  # of any start
-            solved = equation.curves(rates, float(x[2]), float(x[1]), turning / abs(float(x[2])))
+        if equation.weighted or not solved:  # curves without weight serve every start
+            seconds = _seconds(start, x) if equation.weighted else turning / abs(float(x[2]))
+            solved = equation.curves(rates, float(x[2]), float(x[1]), seconds)
         pairs = [(curve, start.fitted(curve, x, 15)) for curve in solved if curve is not None]
         for curve, fit in sorted(pairs, key=lambda pair: pair[1].cost)[:4]:
             likelihood = settle(start, curve, fit.x)

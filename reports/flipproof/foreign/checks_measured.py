@@ -564,15 +564,11 @@ def check_restitution(traits: Traits) -> CheckGenerator:
     wrong = [r for r in rebounds if not r.holds]
     worst = max(wrong or rebounds, key=lambda r: abs(r.restitution - RESTITUTION) - r.room)
     expected, observed, advice = f"e = {RESTITUTION} within {worst.room:.2g}", f"e = {worst.restitution:.4f}", ""
-    stuck = "" if wrong else (yield from _stuck(traits))
+    stuck, stuck_advice = ("", "") if wrong else (yield from _stuck(traits))
     if stuck:
         expected += f", for slow impacts, too: a rest begins below omega_0 L / {1 / MAX_REST:.0f}"
         observed, where = f"none where a slice would leave {stuck}", "slices let go near the ends, no weight, no drag"
-        advice = (
-            "already before it strikes it is on that end: begin at ask.start, wherever that is"
-            if stuck.endswith(PUT_ON_END)
-            else "look at the speed below which a slice rests on its end"
-        )
+        advice = stuck_advice
     elif not wrong:
         speeds = [r.speed for r in rebounds]
         observed += f" where it is farthest off, at {min(speeds):.2g} to {max(speeds):.2g} m/s"
@@ -603,15 +599,12 @@ def check_restitution(traits: Traits) -> CheckGenerator:
 MAX_REST: Final = 1e-4
 """Speed after an impact below which a slice may rest on its end, fraction of omega_0 L."""
 
-PUT_ON_END: Final = ": it is there from the release on"
-"""What ends the text of a slice that is put onto the end near which it begins."""
-
 SLOW: Final = 3e-3 * 2.0 ** np.arange(6)
 """Speeds of slow impacts on the base, fraction of omega_0 L; those on the cap are a third faster."""
 
 
-def _stuck(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], str]:
-    """Return which end a slice does not leave after a slow impact, and at what speed it should; empty if it leaves.
+def _stuck(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], tuple[str, str]]:
+    """Return which end a slice does not leave at what speed after a slow impact, and advice; both empty if it leaves.
 
     Without weight and drag, a slice at x from the centre of light water that fills both ends alike is thrown outward at
     omega^2 x in every equation of the ladder. Let go at d from its end, it strikes with v = omega sqrt(2 x d) after
@@ -642,8 +635,11 @@ def _stuck(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], str]:
         share = RESTITUTION * shares[rebound, end]
         speed = share * throw.omega0 * throw.bottle.length
         place = f"the {('base', 'cap')[end]} at {share:.2g} omega_0 L, {speed:.2g} m/s"
-        return place + (PUT_ON_END if before[rebound, end] < 0.1 * distance[rebound, end] else "")
-    return ""
+        if before[rebound, end] < 0.1 * distance[rebound, end]:
+            advice = "already before it strikes it is on that end: begin at ask.start, wherever that is"
+            return f"{place}: it is there from the release on", advice
+        return place, "look at the speed below which a slice rests on its end"
+    return "", ""
 
 
 def _rebounds(traits: Traits, spins: Sequence[float], answers: Sequence[Answer]) -> list[Rebound]:

@@ -32,6 +32,7 @@ from flipproof.film.estimate import (
     shortest,
 )
 from flipproof.film.fall import fall_after, hand_share
+from flipproof.film.hand import MOTIONS
 from flipproof.film.judge import EXCHANGED, Assessment, UnsoundError, shared_draws
 from flipproof.film.likelihood import Film, Held, Likelihood
 from flipproof.film.measured import Measured, hold
@@ -137,9 +138,12 @@ def test_the_slope_of_every_value_is_that_of_the_model(quantity, solver):
     (curve,) = Equation(solver, THROW).curves(np.array([[rate, 0.4]]), made.truth["omega0"], 1.5, 0.3)
     spin = np.array([made.truth["release"], 1.6, 1.02 * made.truth["omega0"]])
     x = fit_place(film, curve, spin, made.truth["touch"], 0.2)[0] + 0.1
-    if quantity != "points":
+    count = MOTIONS if quantity == "points" else 1  # of a hand
+    if quantity == "points":
+        x = np.insert(x, -2, np.full(3 * (MOTIONS - 1), 0.1))
+    else:
         film, x = table(quantity, film.t, film.t), x[[0, 1, 2, -2]]
-    likelihood = Likelihood(film, Held(), made.truth["touch"], 1e-3)
+    likelihood = Likelihood(film, Held(), made.truth["touch"], 1e-3, count=count)
     _, slopes = likelihood.model(curve, x)
     for k in range(len(x)):
         step = np.zeros(len(x))
