@@ -292,6 +292,12 @@ class Assessment:
                 f"{film.label}: {estimate.solver}: the search did not end in {estimate.flights} flights: give more "
                 "--minutes or fewer --slices"
             )
+        lasts = estimate.likelihood.touch - float(x[0])
+        if estimate.likelihood.planar and lasts < MIN_FLIGHT and (held.release is None or held.touch is None):
+            raise UnsoundError(
+                f"{film.label}: the flight found lasts {lasts:.3g} s, from {x[0]:.4g} s on; a flip lasts "
+                f"{MIN_FLIGHT:g} s at least: give --release and --landing, and see whether it is water that flies"
+            )
         if len(self.residuals) < 8:
             clicked = int((estimate.flying & film.clicked.all(axis=0)).sum())
             total = int(film.clicked.all(axis=0).sum())
@@ -309,12 +315,6 @@ class Assessment:
                 f"{clicked} that it takes for one; 8 are needed: {advice}"
             )
         if estimate.likelihood.planar:
-            lasts = estimate.likelihood.touch - float(x[0])
-            if lasts < MIN_FLIGHT and (held.release is None or held.touch is None):
-                raise UnsoundError(
-                    f"{film.label}: the flight found lasts {lasts:.3g} s, from {x[0]:.4g} s on; a flip lasts "
-                    f"{MIN_FLIGHT:g} s at least: give --release and --landing, and see whether it is water that flies"
-                )
             if held.release is None and x[0] < film.t[0] + 2 * float(np.median(np.diff(film.t))):
                 raise UnsoundError(
                     f"{film.label}: the release at {x[0]:.4g} s lies within two frames of the first: click frames "

@@ -27,11 +27,11 @@ from flipproof.foreign.checking import (
     time_of_max,
     whole_turns,
 )
-from flipproof.foreign.comparison import TextGenerator
+from flipproof.foreign.comparison import TextGenerator, comparing
 from flipproof.foreign.contract import IMPACT, Answer, Ask, ForeignError, Traits
 from flipproof.foreign.departures import UNEXPLAINED, departing
-from flipproof.foreign.place import switches_of
-from flipproof.foreign.throws import PIECES, far_from_ends
+from flipproof.foreign.place import placing, switches_of
+from flipproof.foreign.throws import PAPER, PIECES, SEED, far_from_ends
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass, moment_of_inertia
 from slicemodel.schemes import SCHEMES
@@ -277,7 +277,11 @@ SLOW: Final = replace(THROW, omega0=THROW.omega0 / 8, duration=8 * THROW.duratio
 LISTED: Final = "answer the speeds of an impact in the bottle, just before it and just after it"
 """What to look at if the speeds of impacts are wrong."""
 
+LAW: Final = "look at the rebound: a slice leaves an end at e times its speed, both measured in the bottle"
+"""What to look at if the motion after impacts is wrong, too."""
+
 RIGHT_MOTION: Final = "the motion is right from one output to the next"
+RIGHT_OMEGA: Final = "omega is right after impacts"
 
 
 DEFINED: Final = {
@@ -330,6 +334,17 @@ def _departure_advice(traits: Traits, otherwise: str) -> TextGenerator:
     )
 
 
+def _omega_advice(traits: Traits) -> TextGenerator:
+    """Return what to look at where speeds of impacts are wrong, by whether omega is right; empty if not known."""
+    equation = traits.equation or (yield from placing(traits)).followed
+    if not equation or equation in SCHEMES:
+        return ""
+    (comparison,) = yield from comparing(traits, [PAPER], SEED, equation, elsewhere.UNREFINED)
+    if "omega" in comparison.wrong and comparison.onset:
+        return f"omega is wrong, too, {comparison.onset}: {LAW}"
+    return f"{RIGHT_OMEGA}: {LISTED}" if comparison.wrong.keys() <= {"impacts"} else ""
+
+
 def _ends_exchanged(answer: Answer, hits: Impacts) -> bool:
     """Return whether most slices are nearer to the other end than that which they are said to strike."""
     if answer.r is None:
@@ -373,7 +388,7 @@ def check_definitions(traits: Traits) -> CheckGenerator:
                 if not advice and answer.r is not None and given:
                     drifts = [n for n, errors in _defined(answer)[1].items() if n in given and errors.max() > bound]
                     advice = (yield from _drift_advice(traits, answer, drifts[0], bound)) if drifts else ""
-                advice = advice or LISTED
+                advice = advice or (yield from _omega_advice(traits)) or LISTED
             return Observation(
                 holds=holds,
                 expected="speed_after = e speed_before of each of the impacts, or 0",

@@ -82,7 +82,7 @@ class Comparison:
     ``own_error`` is the solver's own error of omega where it was compared, ``largest`` the largest difference of omega,
     ``share`` the share of output times that were compared. ``error`` says why there is no answer, ``onset`` after which
     impact it goes wrong, ``impacts_passed`` how many it gets right before, ``listed`` what is wrong with its impacts,
-    ``whole_turns`` whether theta is off by whole turns.
+    ``lumped`` which of them share an instant that should not, ``whole_turns`` whether theta is off by whole turns.
     """
 
     wrong: Mapping[str, tuple[float, float, float]]
@@ -93,6 +93,7 @@ class Comparison:
     onset: str = ""
     impacts_passed: int = 0
     listed: str = ""
+    lumped: str = ""
     whole_turns: bool = False
 
     @property
@@ -169,6 +170,7 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
         onset=onset,
         impacts_passed=impacts_passed,
         listed=listed,
+        lumped=_lumped(finest.impacts, truth.impacts or NO_IMPACTS, first_wrong) if wrong and finest.impacts else "",
         whole_turns="theta" in wrong and whole_turns((finest.theta[:reached] - truth.theta[:reached])[clear], 1e-3),
     )
 
@@ -272,6 +274,31 @@ def _listed_wrongly(ask: Ask, answered: Impacts, truth: Impacts) -> str:
     if odd.any():
         return f"{np.sum(odd)} are listed where there is none, at {times_text(answered.time[odd])}"
     return f"{len(answered)} are listed, {len(truth)} expected" if len(answered) != len(truth) else ""
+
+
+def _lumped(answered: Impacts, truth: Impacts, until: float) -> str:
+    """Return which impacts, before a time [s], are answered at one instant though they come one after the other.
+
+    Empty if there are none, or if impacts are answered no nearer to their times than these are to each other.
+    """
+    order = np.argsort(answered.time, kind="stable")
+    order = order[answered.time[order] < until]
+    apart = np.abs(answered.time[order, None] - truth.time)
+    for name in ("slice", "end"):
+        apart[getattr(answered, name)[order, None] != getattr(truth, name)] = np.inf
+    if len(order) < 2 or not len(truth):
+        return ""
+    true_times = truth.time[np.argmin(apart, axis=1)]
+    at_once = np.diff(answered.time[order]) < 1e-9 * until
+    gaps = np.where(at_once, np.abs(np.diff(true_times)), 0.0)
+    k = int(np.argmax(gaps))
+    if gaps[k] <= max(1e-6 * until, 10 * float(np.median(apart.min(axis=1)))):
+        return ""
+    first, second = answered.slice[order[k : k + 2]].tolist()
+    return (
+        f"the impacts of slices {first} and {second}, {gaps[k]:.2g} s apart, are answered at one instant, "
+        f"{answered.time[order[k]]:.6g} s: a slice rebounds when it reaches its end, and not before"
+    )
 
 
 def times_text(times: FloatArray) -> str:

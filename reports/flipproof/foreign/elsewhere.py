@@ -353,6 +353,8 @@ def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNRE
     if traits.refined_by is None and right:  # the room is wide: a small error may still be the same one
         right = {name: size for name, size in right.items() if size <= 1e-9 + 100 * min(right.values())}
     onset = f"with all of it first wrong {full.onset}; "
+    if full.lumped:
+        return f"{full.lumped}; {onset}"
     if {"weight", "impacts"} <= right.keys():
         if "rests" in right:
             return f"right without weight, and without rests: look at {LOOK_AT['rests']}; {onset}"
