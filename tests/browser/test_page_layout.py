@@ -32,9 +32,13 @@ PAPER = (695, 1013)
 def opened(request, visit):
     file, size, scheme = request.param
     with visit(size, scheme, file) as visited:
-        visited.page.evaluate("document.querySelectorAll('details').forEach(details => { details.open = true; })")
-        visited.settle()
+        open_all(visited)
         yield visited
+
+
+def open_all(visited):
+    visited.page.evaluate("document.querySelectorAll('details').forEach(details => { details.open = true; })")
+    visited.settle()
 
 
 def test_the_dark_changes_colours_alone():
@@ -50,6 +54,14 @@ def test_the_dark_changes_colours_alone():
 
 def test_nothing_reaches_beyond_the_window(opened):
     assert opened.probe("overflow") == []
+
+
+@pytest.mark.parametrize("file", ["index.html", "evidence.html"])
+def test_a_window_of_320_pixels_does_not_scroll_sideways(visit, file):
+    """WCAG 1.4.10: as wide as a page of 1280 pixels at 400 %."""
+    with visit((320, 640), at=file) as visited:
+        open_all(visited)
+        assert visited.page.evaluate("document.documentElement.scrollWidth") == 320
 
 
 def test_no_text_lies_over_text(opened):

@@ -327,6 +327,14 @@ def test_all_packages_settings_and_failures_in_one_sweep(tmp_path):
         assert (row["reason"] != "") == (point.solver == "pymunk")  # it counts no impacts
 
 
+def test_a_sweep_without_a_flight_is_an_error_that_keeps_its_rows(tmp_path):
+    design = 'sweep = {design = "grid", fields = {restitution = [2.0, 3.0]}}\n[[solvers]]\nname = "eq8"'
+    (tmp_path / "sweep.toml").write_text(design)
+    with pytest.raises(SweepError, match=r"none of 2 points in .* \(2 impossible\); the first: .*restitution"):
+        sweeping.sweep(tmp_path / "sweep.toml", tmp_path / "out", lambda _size: lambda *_: None, jobs=1)
+    assert (tmp_path / "out" / "sweep.sqlite").stat().st_size
+
+
 def test_one_throw_that_no_solver_can_fly_does_not_take_the_others_with_it():
     throws = [dict(point.throw) for point in design(5).points()]
     alone: list[Row] = [make_flights("eq8", {}, [throw])[0] for throw in throws]

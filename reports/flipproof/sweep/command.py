@@ -71,7 +71,7 @@ def completed(
     Raises
     ------
     SweepError
-        If the folder, the workers or the disk will not do; what was stored is kept.
+        If the folder, the workers or the disk will not do, or no point has a flight; what was stored is kept.
     """
     began = time.perf_counter()
     if export_to:
@@ -94,15 +94,17 @@ def completed(
         kinds = ", ".join(f"{counts[status]} {status}" for status in OUTCOMES if status in counts)
         rate = f"; {new_count} made in {seconds:.1f} s ({new_count / seconds:.0f} per second)" if new_count else ""
         stored = f"; {size - new_count} were there" if new_count < size else ""
-        yield store, f"{size} points in {store.path}: {kinds}{rate}{stored}{_first_failure(store, points, counts)}"
+        failure = _first_failure(store, points) if counts.keys() & NO_FLIGHT else ""
+        if counts.keys() <= NO_FLIGHT:
+            raise SweepError(f"none of {size} points in {store.path} has a flight ({kinds}); the first: {failure}")
+        failure = failure and f"\nthe first without a flight: {failure}"
+        yield store, f"{size} points in {store.path}: {kinds}{rate}{stored}{failure}"
 
 
-def _first_failure(store: Store, points: Callable[[], Iterable[Point]], counts: Mapping[str, int]) -> str:
-    """Return why the first point in the order of the design has no flight, if one has none."""
-    if not counts.keys() & NO_FLIGHT:
-        return ""
+def _first_failure(store: Store, points: Callable[[], Iterable[Point]]) -> str:
+    """Return why the first point in the order of the design that has no flight has none."""
     reasons = (str(row["reason"]) for row in rows_of(store, points()) if row and row["status"] in NO_FLIGHT)
-    return f"\nthe first without a flight: {shortened(next(reasons, ''), 200)}"
+    return shortened(next(reasons, ""), 200)
 
 
 @contextmanager
