@@ -52,7 +52,7 @@ HEAD = (
     "restitution off by up to",
     "spread over the phase",
     "nothing rebounds",
-    "energy after twenty elastic bounces",
+    "energy left after the time of twenty elastic bounces",
     "height after 1.2 s with e = 0.7",
     "rests above the floor [mm]",
     "numbers",

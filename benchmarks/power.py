@@ -58,7 +58,7 @@ BLIND: Final = (
     "twelfth", "thirteenth", "fourteenth", "fifteenth", "sixteenth", "seventeenth", "eighteenth", "nineteenth",
     "twentieth", "twentyfirst", "twentysecond", "twentythird", "twentyfourth", "twentyfifth", "twentysixth",
     "twentyseventh", "twentyeighth", "thirtieth", "thirtyfirst", "thirtysecond", "thirtythird",
-    "thirtyfourth", "thirtyfifth", "thirtysixth",
+    "thirtyfourth", "thirtyfifth", "thirtysixth", "thirtyseventh",
 )  # fmt: skip
 """Lists by people who had not seen the checks."""
 

@@ -302,8 +302,11 @@ PACKAGES = {
     ),
     "aimed, B": Refuses(thrown(aimed, FOUR, family="B"), {"gravity": [0.0]}),
     "aimed, B, in a short flight": Refuses(
-        thrown(aimed, FOUR, family="B"), {"duration": [0.01]}, named=r"theta\(0\.01 s\) stays below \d+ degrees up to"
+        thrown(aimed, replace(FOUR, launch_velocity=(0.0, 0.0)), family="B"),
+        {"duration": [0.01]},
+        named=r"theta\(0\.01 s\) stays below \d+ degrees up to",
     ),
+    "aimed, B, while it rises": Refuses(thrown(aimed, FOUR, family="B"), {"duration": [0.01, 0.19]}),
     "aimed, B, behind the release": Refuses(
         given(aimed, throw=FOUR, family="B"),
         {"offset": [-5.0]},

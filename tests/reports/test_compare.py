@@ -56,7 +56,7 @@ def test_two_columns_are_enough(capsys, tmp_path, first, second, quantity, witho
     status, out, _ = flipproof(capsys, a, b)
     assert status == 0
     size = "0.5 of omega_0" if quantity == "omega" else "0.5 rad"
-    assert f"{quantity}: largest difference {size} at t = 1\n" in out
+    assert f"{quantity}: largest difference {size} at t = 1 (of 3 times, 1 apart)\n" in out
     for name in without:
         assert f"{name} is not compared: {a} and {b} have no values of it" in out
     assert "interpolated" not in out

@@ -31,7 +31,7 @@ def picture(passports: Sequence[Passport]) -> Drawing:
         energy_axes.axhline(1.0, color="0.7", linewidth=0.8, zorder=0)
         low, high = min(energy["kept"]), max(energy["kept"])
         energy_axes.set_ylim(min(low, 0.99) - 0.05 * (high - low), max(high, 1.01) + 0.05 * (high - low))
-        energy_axes.set(xlabel="step [ms]", ylabel="energy after / before", title="twenty elastic bounces")
+        energy_axes.set(xlabel="step [ms]", ylabel="energy after / before", title="the time of twenty elastic bounces")
         order = passport["order"].numbers
         steps = 1e3 * np.array(order["steps_s"])
         error_axes.loglog(steps, np.maximum(order["errors_m"], FLOOR), ".-", label="across impacts")

@@ -331,7 +331,7 @@ def _return_delays(adapter: Adapter, dt: float) -> tuple[float, float, FloatArra
 
 
 def energy(adapter: Adapter, dt: float) -> Measurement:
-    """Ratio of the energies after and before twenty elastic bounces from one metre, at four steps."""
+    """Share of the energy left after the time of twenty elastic bounces from one metre, at four steps."""
     duration = 20 * 2 * math.sqrt(2 / GRAVITY)
     ratios, stop = [], ""
     for step in STEPS:
@@ -344,11 +344,11 @@ def energy(adapter: Adapter, dt: float) -> Measurement:
     remarks = [stop] if stop else []
     if not max(abs(low - 1), abs(high - 1)) <= 0.01:
         below = " (negative: the body lies below the floor)" if low < 0.0 else ""
-        remarks.append(f"twenty elastic bounces leave {low:.4g} to {high:.4g} of the energy{below}")
+        remarks.append(f"after the time of twenty elastic bounces {low:.4g} to {high:.4g} of the energy is left{below}")
     return Measurement(
         "energy",
-        f"twenty elastic bounces leave {low:.4f} to {high:.4f} of the energy, at steps from {STEPS[-1] * dt:g} to "
-        f"{STEPS[0] * dt:g} s",
+        f"after the time of twenty elastic bounces {low:.4f} to {high:.4f} of the energy is left, at steps from "
+        f"{STEPS[-1] * dt:g} to {STEPS[0] * dt:g} s",
         "; ".join(remarks),
         {"kept": ratios, "steps_s": [step * dt for step in STEPS]},
     )

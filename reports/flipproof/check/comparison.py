@@ -86,6 +86,6 @@ def ends(comparison: Comparison, first: Curve) -> list[str]:
         row(f"omega({t[-1]:.4g} s) [rad/s]", one[-1], other[-1])
         row("omega/omega_0, mean of second half", plateau(t, one, omega0), plateau(t, other, omega0))
         moment = replace(column, tolerance=PARTING_BAND).parted
-        words = "never" if moment is None else f"{moment:.5g} s"
+        words = "never" if moment is None else f"{moment:.{comparison.digits}g} s"
         parted = [f"first more than {PARTING_BAND:.0%} of omega_0 apart: {words}"]
     return lines + parted

@@ -126,7 +126,7 @@ def add_compare(commands: Any) -> None:
     )  # fmt: skip
     compare.add_argument("second", metavar="B", help="the same; differences are B minus A")
     compare.add_argument("--scenario", metavar="SCENARIO.toml", help=SCENARIO_HELP)
-    compare.add_argument("--slices", type=count, metavar="N", help="slices for both solvers (default 50)")
+    compare.add_argument("--slices", type=count, metavar="N", help="slices for both solvers (default: at most 50)")
     compare.add_argument(
         "--tolerance", type=tolerance, metavar="X", help="end with status 1 if the largest difference in omega exceeds "
         "X omega_0; without omega in both, in theta X rad; without theta, in r_cm X m",

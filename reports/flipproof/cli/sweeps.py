@@ -36,7 +36,7 @@ def add_sweeps(commands: Any) -> None:
     drawn.add_argument(
         "--size", type=size, default=(20, 20), metavar="CxR", help="fill fractions by values of the axis (20x20)"
     )
-    drawn.add_argument("--slices", type=count, metavar="N", help=f"slices of every throw (at most {SLICES})")
+    drawn.add_argument("--slices", type=count, metavar="N", help=f"slices of every throw (default: at most {SLICES})")
     add_store(drawn)
 
     waterfall = add_command(

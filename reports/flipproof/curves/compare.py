@@ -178,10 +178,10 @@ class Comparison:
 
     @property
     def digits(self) -> int:
-        """Digits of times that tell one output step from the next, 6 to 15."""
+        """Digits of times that tell one output step from the next, 4 to 15."""
         t = self.columns[0].gap.t
         step, largest = median_step(t), float(np.abs(t).max())
-        return int(np.clip(math.ceil(math.log10(largest / step)) + 2, 6, 15)) if step > 0.0 and largest > 0.0 else 6
+        return int(np.clip(math.ceil(math.log10(largest / step)) + 1, 4, 15)) if step > 0.0 and largest > 0.0 else 6
 
     @property
     def lines(self) -> list[str]:
@@ -193,6 +193,8 @@ class Comparison:
             text = f"{column.name}: largest difference {size} at t = {gap.t[k]:.{digits}g}"
             if gap.interpolated:
                 text += f" ({gap.interpolated} of {len(gap.t)} times interpolated, {column.comparable.sum()} compared)"
+            elif len(gap.t) > 1:
+                text += f" (of {len(gap.t)} times, {median_step(gap.t):.2g} apart)"
             lines.append(text)
             if column.horizon is not None:
                 at = f"at {column.tolerance:g}"

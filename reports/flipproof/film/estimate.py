@@ -264,8 +264,13 @@ def _estimate_from(
     fits, curves = grid.fits, grid.curves
     best = int(np.argmax(grid.log_densities))
     draws = _draws(likelihood, grid)
-    touching = near_flight(film, likelihood, float(fits[best].x[0]), AFTER)
-    times, costs, _ = _touch_costs(touching, curves[best], fits[best].x)
+    x = fits[best].x
+    after = max(AFTER, 4 * float(np.median(np.diff(film.t))))
+    touching = near_flight(film, likelihood, float(x[0]), after)
+    times, costs, _ = _touch_costs(touching, curves[best], x)
+    # Another equation may have its touch elsewhere: evidence is that of the same frames.
+    later = near_flight(film, likelihood, float(x[0])).per_click(curves[best], x)[0].sum()
+    later -= likelihood.per_click(curves[best], x)[0].sum()
     prob = np.exp(TRUST * (costs.min() - costs))
     rng = np.random.default_rng(1)
     drawn = rng.choice(len(times), DRAWS, p=prob / prob.sum())
@@ -273,15 +278,15 @@ def _estimate_from(
     likelihood = likelihood.replaced(film=film)
     return Estimate(
         film=film, throw=sliced, solver=solver, held=held, likelihood=likelihood, curve=curves[best], fit=fits[best],
-        draws=draws, evidence=float(np.logaddexp.reduce(grid.log_masses) - np.log(np.arcsinh(MAX_RATE / SCALE))),
+        draws=draws,
+        evidence=float(np.logaddexp.reduce(grid.log_masses) - np.log(np.arcsinh(MAX_RATE / SCALE)) - later),
         touched=bool(likelihood.touch < film.t[-1]), flights=n_flights, complete=complete, rugged=rugged,
     )  # fmt: skip
 
 
 def near_flight(film: Film, likelihood: Likelihood, release: float, after: float = REACH) -> Likelihood:
-    """Return the likelihood of a film's frames in flight and of those around it, which determine its ends."""
-    last = likelihood.touch + max(after, 4 * float(np.median(np.diff(film.t))))
-    near = (film.t >= release - REACH) & (film.t <= last)
+    """Return the likelihood of a film's frames from ``REACH`` before the release to ``after`` the touch [s]."""
+    near = (film.t >= release - REACH) & (film.t <= likelihood.touch + after)
     return likelihood.replaced(film=film.frames(near))
 
 
@@ -349,7 +354,8 @@ def _adaptive_grid(
         axes = [low[k] + cell[k] * (np.arange(shape[k]) + 0.5) for k in range(2)]
         nodes = np.array(list(product(*axes)))
         x = seed_x[0]
-        likelihood = near_flight(film, likelihood, float(x[0]))
+        # A table always pushes upwards; the last fits would take that for less gravity, not for noise.
+        likelihood = near_flight(film, likelihood, float(x[0]), 0.0 if shape == FINE else REACH)
         solved = _curves_at(likelihood, equation, nodes, x)
         nodes = nodes[[curve is not None for curve in solved]]
         curves = [curve for curve in solved if curve is not None]

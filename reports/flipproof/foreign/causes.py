@@ -14,7 +14,7 @@ from flipproof.foreign.checking import WRAPPED, whole_turns
 from flipproof.foreign.interval import FIELDS, FLOOR, Interval
 from slicemodel import Scenario
 from slicemodel.observables import centre_of_mass
-from slicemodel.trajectory import BASE, FloatArray
+from slicemodel.trajectory import BASE, CAP, FloatArray
 
 OFF_MOMENTUM: Final = 1e-4
 """Departure of omega from constant angular momentum between two outputs that is no error of a step."""
@@ -241,7 +241,9 @@ def delay(interval: Interval, index: int) -> float:
 
 
 def _place_cause(intervals: Sequence[Interval]) -> str:
-    """Return how far slices are answered beyond an end, if they are in most intervals."""
+    """Return how far slices are answered beyond an end, if they are in most intervals, or stay before one."""
+    if short := _short_of_an_end(intervals):
+        return short
     beyond = np.array([max(float(np.max(i.r - i.throw.r_max)), float(np.max(i.throw.r_min - i.r))) for i in intervals])
     heights = np.array([i.throw.slice_height for i in intervals])
     outside = beyond > 1e-4 * heights
@@ -258,6 +260,18 @@ def _place_cause(intervals: Sequence[Interval]) -> str:
         f"slices are answered up to {beyond.max():.2g} m beyond an end: an answer between two steps must know of an "
         "impact on its way: look at times after an impact in the same step"
     )
+
+
+def _short_of_an_end(intervals: Sequence[Interval]) -> str:
+    """Return at which part of their height before an end slices stay, if it is the same in many intervals."""
+    for end, name in ((CAP, "cap"), (BASE, "base")):
+        gaps = []
+        for i in intervals:
+            room = (i.r[0] - i.throw.r_min if end == CAP else i.throw.r_max - i.r[0]) / i.throw.slice_height
+            gaps += room[~i.v.any(axis=0) & (room > 1e-4) & (room < 2.0)].tolist()
+        if len(gaps) > max(5, 0.2 * len(intervals)) and np.ptp(gaps) < 1e-3:
+            return f"slices stay {gaps[0]:.2g} of their height before the {name}: look at the places of the ends"
+    return ""
 
 
 def _advance_cause(intervals: Sequence[Interval]) -> str:

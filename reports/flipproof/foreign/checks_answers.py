@@ -702,7 +702,7 @@ def check_velocity(traits: Traits) -> CheckGenerator:
             if sizes[-1] < 0.7 * sizes[0]
             else "r jumps between times asked: look at how r and v are answered between two steps; "
             if rms(np.diff(answers[0].r, n=2, axis=0)) > JUMP * rms(np.diff(answers[0].r, axis=0))
-            else "so small a difference that does not fall: look at the coefficients of answers between two steps; "
+            else "so small a difference that does not fall: look at coefficients of a step and of answers inside it; "
             if traits.refined_by and sizes[0] < SLIGHT
             else ""
         )

@@ -153,7 +153,9 @@ def compare(traits: Traits, ask: Ask, answers: Sequence[Answer], equation: str, 
     impacts_passed, onset = _onset(ask, truth.impacts or NO_IMPACTS, first_wrong) if wrong else (0, "")
     listed = ""
     if finest.impacts is not None and clear.any():
-        room_of_r = rooms.get("r", rooms["omega"])[clear]
+        # Where omega hardly knows of a slice, its impacts depend on the rest speed as its place does.
+        band_of_r = BAND * sum(grown(sizes(truth, twin, "r")) for twin in twins)
+        room_of_r = rooms.get("r", np.maximum(rooms["omega"], floor + band_of_r))[clear]
         by_rest_speed = [
             _unmatched(ask, finest.impacts, run.impacts or NO_IMPACTS, room_of_r, ask.times[:reached][clear])
             for run in (truth, twins[-1])
@@ -268,6 +270,11 @@ def _listed_wrongly(ask: Ask, answered: Impacts, truth: Impacts) -> str:
             "after which a slice rests": truth.speed_after == 0.0,
             "after the first": np.arange(len(truth)) > 0,
         }
+        fastest = float(np.max(truth.speed_before[lacking]))
+        speed = f"{fastest / fast * FAINT:.2g} omega_0 L"
+        if not len(answered):
+            return f"none of {len(expected)} is listed, of which the fastest has {speed}"
+        kinds[f"not faster than {speed}"] = truth.speed_before <= fastest
         fits = [kind for kind, of_kind in kinds.items() if expected[of_kind[expected]].tolist() == lacking]
         which = fits[0] if fits else f"at {times_text(truth.time[lacking])}"
         return f"{len(lacking)} of {len(expected)} are missing, those {which}"

@@ -318,12 +318,20 @@ def wrong_on_whole(traits: Traits, equation: str) -> TextGenerator:
 
 LOOK_AT: Final[Mapping[str, str]] = {
     "weight": "the weight term, g cos(theta) along the bottle",
-    "drag": "the drag, alpha v / m, and against what v is measured",
+    "drag": "the drag, alpha v / m, against what v is measured, and what it does to the bottle",
     "impacts": "impacts: restitution, recoil, their places, which slices take part",
     "rests": "rests: when a slice begins to rest on base or cap, when it is let go, and its part in the motion "
     "and the impacts of others",
 }
 """What to look at if an answer is right without weight, drag, impacts or rests, in the order they are tested."""
+
+
+HEAVY: Final = 1e4
+"""Mass of a bottle that impacts hardly move, though each is answered [kg]."""
+
+RECOIL: Final = (
+    "the recoil: the momentum that a slice loses moves the bottle and what rests in it, so that v of all others changes"
+)
 
 
 def right_without(name: str) -> str:
@@ -353,8 +361,9 @@ def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNRE
     if traits.refined_by is None and right:  # the room is wide: a small error may still be the same one
         right = {name: size for name, size in right.items() if size <= 1e-9 + 100 * min(right.values())}
     onset = f"with all of it first wrong {full.onset}; "
-    if full.lumped:
-        return f"{full.lumped}; {onset}"
+    lumped = [comparison.lumped for comparison in (full, *comparisons) if comparison.lumped]
+    if lumped:
+        return f"{lumped[0]}; {onset}"
     if {"weight", "impacts"} <= right.keys():
         if "rests" in right:
             return f"right without weight, and without rests: look at {LOOK_AT['rests']}; {onset}"
@@ -369,6 +378,11 @@ def simpler_throws_advice(traits: Traits, equation: str, unrefined: float = UNRE
         return f"right through impacts as long as no slice rests: look at {LOOK_AT['rests']}; {onset}"
     for name in ("weight", "drag", "impacts"):
         if name in right:
+            if name == "impacts" and "impacts" in full.wrong and switches_of(equation).recoil:
+                (heavy,) = yield from comparing(traits, [replace(whole, mass=HEAVY)], 0, equation, unrefined)
+                if not heavy.wrong:
+                    words = f"right before the first impact, and in a bottle of {HEAVY / 1000:g} t"
+                    return f"{words}: look at {RECOIL}; {onset}"
             return f"{right_without(name)}{onset}"
     if "all" in right:
         return f"right without weight, drag and impacts together, but wrong if only one of them is removed; {onset}"

@@ -122,6 +122,8 @@ class Place:
         """What to do, if nothing but the place is known; else empty."""
         if self.still or self.on_lattice:
             return ""
+        if self.solver in MODELS:
+            return f"{self.solver} has other physics than all of them"
         coarse = "take shorter steps or declare refined_by; if that changes nothing, " if self.change is None else ""
         return f"{coarse}look for another restitution, drag, mass or gravity than the throw's, or for other physics"
 

@@ -5,7 +5,7 @@
     package.module:name                an importable object
     path/to/file.py:name               an object of a file
     csv:FOLDER                         questions as files, and the answers that somebody puts beside them
-    cmd:"julia mine.jl {scenario} {times} {out}"     any program that reads and writes files
+    cmd:"julia mine.jl {scenario} {times} {start} {effort} {out}"     any program that reads and writes files
 
 An object is a callable, an object with ``solve(ask)``, or a class of such objects without arguments. Specs are
 strings, so that they can be sent to other processes; each process resolves them for itself.
@@ -84,7 +84,7 @@ def locate(spec: str) -> EntryPoint | tuple[str, str]:
 
     A spec that names nothing raises a ValueError that says how specs are written.
     """
-    forms = "package.module:name, file.py:name, csv:FOLDER or cmd:'program {scenario} {times} {out}'"
+    forms = "package.module:name, file.py:name, csv:FOLDER or cmd:'program {scenario} {times} {start} {effort} {out}'"
     source, _, name = spec.rpartition(":")
     if not source:
         points = offered()

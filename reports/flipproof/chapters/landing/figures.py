@@ -202,7 +202,8 @@ def share_line(results: LandingStudy, family: str) -> str:
             words.append(f"{fill:g}: {share.upright} of {share.throws}{undecided}{missed} [{low:.3f}, {high:.3f}]")
         if words:
             lines.append(f"  {landing.words}: " + ", ".join(words))
-    return "\n".join(lines)
+    reasons = {why: None for (of, _, _), why in results.unaimed.items() if of == family}
+    return "\n".join([*lines, *(f"  not thrown: {why}" for why in reasons)])
 
 
 def page(results: LandingStudy) -> dict[str, object]:

@@ -79,9 +79,10 @@ def land_throw(
 def describe(rows: Sequence[Row], table: Table) -> str:
     """Return what happens as lines: the touch of each bottle, then a line for each landing."""
     slices = rows[0].touch.scenario.n_slices
+    apart = " that, unlike those of free-flight, cannot pass one another" if slices > 1 else ""
     lines = [
         f"table at {table.height:g} m, e_table = {table.restitution:g}, friction {table.friction:g} (no "
-        f"measured values of a bottle on a table were found); N = {slices} slices"
+        f"measured values of a bottle on a table were found); N = {slices} slices{apart}"
     ]
     bottles: set[str] = set()
     for row in rows:
@@ -109,6 +110,10 @@ def _touch_line(name: str, touch: Touch) -> str:
     )
 
 
+BOUNCE: Final = "more than 1 mm high"
+"""Bounces that are counted: those between which no part of the bottle was nearer to the table."""
+
+
 def _how(outcome: Outcome, *, flat: bool) -> str:
     if not outcome.decided:
         return f"undecided: {outcome.reason}"
@@ -119,10 +124,11 @@ def _how(outcome: Outcome, *, flat: bool) -> str:
         )
     times, counts = outcome.diagnostics.get("times", []), outcome.diagnostics.get("bounces", [])
     if len(set(counts)) > 1 or (times and max(times) - min(times) > SAME_MOTION * max(times)):
+        bounces = " to ".join(str(number) for number in sorted({min(counts), max(counts)}))
         return (
             f"{outcome.outcome} in all {len(times)} runs, whose motions differ: likely, not certain; the energy falls "
-            f"below the saddle {min(times):.2f} to {max(times):.2f} s after the touch, after {min(counts)} to "
-            f"{max(counts)} bounces"
+            f"below the saddle {min(times):.2f} to {max(times):.2f} s after the touch, after {bounces} "
+            f"bounces {BOUNCE}"
         )
     assert outcome.certified is not None
     assert outcome.margin is not None
@@ -131,6 +137,6 @@ def _how(outcome: Outcome, *, flat: bool) -> str:
     where = "the saddle out of its cap" if outcome.outcome == "cap" else "the saddle"
     return (
         f"{outcome.outcome}; certain {outcome.certified:.3f} s after the touch, {below} below {where}; "
-        f"bounces {outcome.bounces}; by then the middle of its base has moved {1000 * outcome.slid:+.0f} mm along the "
-        "table"
+        f"{outcome.bounces} bounces {BOUNCE} until then; by then the middle of its base has moved "
+        f"{1000 * outcome.slid:+.0f} mm along the table"
     )

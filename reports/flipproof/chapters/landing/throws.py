@@ -71,18 +71,22 @@ def aimed(throw: Scenario, family: str, offset: float = 0.0) -> Aim:
 
     Of family A, the next one at which its centre of mass falls. A bottle whose rim turns faster than the bottle falls,
     omega R > |v_y|, has met such a table a moment before: ice of family A does. Of a throw that spins backwards, the
-    mirror image is aimed.
+    mirror image is aimed, in whose angles messages are.
 
     Raises
     ------
     ValueError
-        If no omega_0, or no time, gives that angle, or if nothing pulls the bottle down.
+        If no omega_0, or no time, gives that angle, if nothing pulls the bottle down, or if it still rises then.
     """
-    throw = forwards(throw)
     if family not in FAMILIES:
         raise ValueError(f"family = {family!r} is unknown (admissible: {', '.join(FAMILIES)})")
     if throw.gravity <= 0.0:
         raise ValueError(f"gravity = {throw.gravity:g} m/s^2 is outside (0, inf): nothing lands without it")
+    if throw.omega0 < 0.0:
+        try:
+            return aimed(mirrored(throw), family, offset)
+        except ValueError as error:
+            raise ValueError(f"the mirror image, which spins forwards: {error}") from None
     goal = math.tau * (math.floor(throw.theta0 / math.tau) + 1) + offset
     if not goal > throw.theta0:
         raise ValueError(
@@ -111,6 +115,12 @@ def _by_height(throw: Scenario, goal: float) -> Aim:
 
 def _by_spin(throw: Scenario, goal: float) -> Aim:
     """Halve 24 times the first interval, of a grid of 2 rad/s, in which a throw turns far enough."""
+    apex = throw.launch_velocity[1] / throw.gravity
+    if throw.duration <= apex:
+        raise ValueError(
+            f"duration = {throw.duration:g} s is outside ({apex:.4g}, inf) s: until then the bottle rises, and meets "
+            "no table from above"
+        )
     slow, farthest = 0.0, -math.inf
     for fast in np.arange(2.0, FASTEST + 1.0, 2.0).tolist():
         angle = _end(throw, fast)[0]
