@@ -15,7 +15,7 @@ from matplotlib.collections import QuadMesh
 from flipproof.build import ask_of, gather_report
 from flipproof.chapters import chapters_named
 from flipproof.chapters.landing.chapter import chunks, claims
-from flipproof.chapters.landing.figures import figure_map, figures, map_csv, page, shares_csv
+from flipproof.chapters.landing.figures import figure_map, figures, map_csv, page, share_line, shares_csv
 from flipproof.chapters.landing.single import describe, land_throw
 from flipproof.chapters.landing.study import (
     AIMING,
@@ -516,6 +516,13 @@ def test_the_chapter_makes_the_same_and_finds_it_in_the_store(found, tmp_path):
         again = gathered(THROW, store).result("landing")
         assert 2 * len(store.call_hits) == store.calls > 4
     assert shares_csv(made) == shares_csv(found) == shares_csv(again)
+
+
+def test_a_line_that_is_missing_has_its_reason(found):
+    rising = replace(THROW, launch_velocity=(0.0, 9.0))
+    cases, unaimed = aiming(rising, SMALL)
+    assert cases == {}
+    assert share_line(replace(found, unaimed=unaimed), "B").count("until then the bottle rises") == 1
 
 
 def test_calls_hold_every_case_once_and_are_worth_keeping():
