@@ -383,8 +383,13 @@ def check_definitions(traits: Traits) -> CheckGenerator:
             )
         if not (holds and answer.r is not None and given):
             advice = "" if holds else _rebound_advice(hits)
+            if not holds:
+                motion = yield from _departure_advice(traits, f"{RIGHT_MOTION}: {LISTED}")
+                if motion.startswith(RIGHT_MOTION):
+                    listed = advice.partition(": look")[0]
+                    advice = f"{motion}{listed and f'; by the list {listed}'}"
+                advice = advice or motion
             if not (holds or advice):
-                advice = yield from _departure_advice(traits, f"{RIGHT_MOTION}: {LISTED}")
                 if not advice and answer.r is not None and given:
                     drifts = [n for n, errors in _defined(answer)[1].items() if n in given and errors.max() > bound]
                     advice = (yield from _drift_advice(traits, answer, drifts[0], bound)) if drifts else ""

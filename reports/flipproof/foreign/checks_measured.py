@@ -248,6 +248,11 @@ def check_order_before(traits: Traits) -> CheckGenerator:
             f"already at the longest steps {worst} changes by no more than {changes[worst][0]:.0e}: look for a "
             f"constant of few digits, or for single precision; {advice or default_advice}"
         )
+    whole = round(float(np.median(list(orders.values()))))
+    if low_order and whole >= CLEAN and all(abs(order - whole) < 0.5 for order in orders.values()):
+        advice = (
+            f"every field is of order {whole}: declare that, if it is the method's; else {advice or default_advice}"
+        )
     return Observation(
         holds=holds,
         expected=f"order {declared:g} or more, within {ORDER_ROOM}",
@@ -257,6 +262,9 @@ def check_order_before(traits: Traits) -> CheckGenerator:
         facts={"order_before_impacts": orders[worst], "orders": orders},
     )
 
+
+CLEAN: Final = 4
+"""Order from which on no wrong coefficient is likely to leave the same one to every field."""
 
 SLIGHT: Final = 1e-5
 """Change of a field, a fraction of its largest value, below which a wrong order is no gross mistake of the method."""

@@ -198,9 +198,20 @@ def check_elsewhere(traits: Traits, seed: int = SEED) -> CheckGenerator:
             (answer,) = yield [replace(ask, times=times)]
             if not compare(traits, replace(ask, times=times), [answer], equation, unrefined).wrong:
                 impacts = "right where outputs lie close: look at what goes on within a long step; "
-    advice = f"{impacts}{advice}".removesuffix("; ")
+    advice = f"{_shared(wrong, flights)}{impacts}{advice}".removesuffix("; ")
     where = "a full bottle, thrown besides" if wrong[0][0] is FULL else f"{len(wrong)} of {len(flights)} throws"
     return Observation(holds=False, expected=expected, observed=observed, where=where, advice=advice, facts=facts)
+
+
+def _shared(wrong: Sequence[tuple[Knobs, Comparison]], flights: Sequence[tuple[Knobs, Comparison]]) -> str:
+    """Return which value several wrong throws share, and no right one has, if there is one; ice aside."""
+    bad = [knobs for knobs, _ in wrong if not knobs.frozen]
+    good = [knobs for knobs, comparison in flights if not (knobs.frozen or comparison.wrong)]
+    for name in WORDS if len(bad) > 1 else ():
+        value = getattr(bad[0], name)
+        if all(getattr(knobs, name) == value for knobs in bad) and all(getattr(knobs, name) != value for knobs in good):
+            return f"the {len(bad)} wrong throws, and no right one, have {knob_text(bad[0], name)}: {WORDS[name][1]}; "
+    return ""
 
 
 def _long_answer(traits: Traits) -> Generator[Sequence[Ask], Sequence[Answer], Answer | None]:
