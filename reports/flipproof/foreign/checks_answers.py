@@ -651,6 +651,9 @@ def _decimals_advice(answer: Answer) -> str:
 SLIGHT: Final = 5e-3
 """Difference of v from dr/dt, fraction of the largest v, that is less than one of unit, frame or instant."""
 
+COEFFICIENTS: Final = "the coefficients of answers between two steps, and of steps"
+"""What to look at where v is slightly wrong."""
+
 JUMP: Final = 0.1
 """Ratio of the second to the first differences of r between close times above which r is not smooth."""
 
@@ -707,7 +710,7 @@ def check_velocity(traits: Traits) -> CheckGenerator:
             if sizes[-1] < 0.7 * sizes[0]
             else "r jumps between times asked: look at how r and v are answered between two steps; "
             if rms(np.diff(answers[0].r, n=2, axis=0)) > JUMP * rms(np.diff(answers[0].r, axis=0))
-            else "so small a difference that does not fall: look at coefficients of a step and of answers inside it; "
+            else f"so small a difference that does not fall: look at {COEFFICIENTS}; "
             if traits.refined_by and sizes[0] < SLIGHT
             else ""
         )

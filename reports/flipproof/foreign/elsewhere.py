@@ -329,7 +329,7 @@ def wrong_on_whole(traits: Traits, equation: str) -> TextGenerator:
 
 LOOK_AT: Final[Mapping[str, str]] = {
     "weight": "the weight term, g cos(theta) along the bottle",
-    "drag": "the drag, alpha v / m, against what v is measured, and what it does to the bottle",
+    "drag": "the drag, alpha v / m, against what v is measured, and in free flight what it does to the bottle",
     "impacts": "impacts: restitution, recoil, their places, which slices take part",
     "rests": "rests: when a slice begins to rest on base or cap, when it is let go, and its part in the motion "
     "and the impacts of others",
