@@ -411,7 +411,7 @@ def rest(adapter: Adapter, dt: float) -> Measurement:
     t, y, v = adapter.drop(0.05, 0.0, 1.0, GRAVITY, dt, 12.0)  # sixty elastic bounces
     if not remarks and not np.abs(v[t > 11.5]).max() >= 0.1:
         stopped = t[np.abs(v) >= 0.1].max(initial=0.0)
-        remarks.append(f"with e = 1 it bounces until {stopped:.2g} s only, from 0.05 m")
+        remarks.append(f"with e = 1, from 0.05 m, it is faster than 0.1 m/s until {stopped:.2g} s only")
     _, y, _ = adapter.drop(0.2, 0.0, 0.0, GRAVITY, dt, 0.6)
     second_half = y[len(y) // 2 :]
     rebound = float((second_half - np.minimum.accumulate(second_half)).max())
