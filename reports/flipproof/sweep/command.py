@@ -95,7 +95,7 @@ def completed(
         rate = f"; {new_count} made in {seconds:.1f} s ({new_count / seconds:.0f} per second)" if new_count else ""
         stored = f"; {size - new_count} were there" if new_count < size else ""
         failure = _first_failure(store, points) if counts.keys() & NO_FLIGHT else ""
-        if counts.keys() <= NO_FLIGHT:
+        if counts and counts.keys() <= NO_FLIGHT:
             raise SweepError(f"none of {size} points in {store.path} has a flight ({kinds}); the first: {failure}")
         failure = failure and f"\nthe first without a flight: {failure}"
         yield store, f"{size} points in {store.path}: {kinds}{rate}{stored}{failure}"

@@ -111,7 +111,7 @@ def _touch_line(name: str, touch: Touch) -> str:
 
 
 BOUNCE: Final = "more than 1 mm high"
-"""Bounces that are counted: those between which no part of the bottle was nearer to the table."""
+"""Bounces that are counted: those in which all of the bottle is as far above the table."""
 
 
 def _how(outcome: Outcome, *, flat: bool) -> str:
@@ -137,6 +137,6 @@ def _how(outcome: Outcome, *, flat: bool) -> str:
     where = "the saddle out of its cap" if outcome.outcome == "cap" else "the saddle"
     return (
         f"{outcome.outcome}; certain {outcome.certified:.3f} s after the touch, {below} below {where}; "
-        f"{outcome.bounces} bounces {BOUNCE} until then; by then the middle of its base has moved "
+        f"bounces {BOUNCE} until then: {outcome.bounces}; by then the middle of its base has moved "
         f"{1000 * outcome.slid:+.0f} mm along the table"
     )
