@@ -389,7 +389,6 @@ def check_definitions(traits: Traits) -> CheckGenerator:
                     listed = advice.partition(": look")[0]
                     advice = f"{motion}{listed and f'; by the list {listed}'}"
                 advice = advice or motion
-            if not (holds or advice):
                 if not advice and answer.r is not None and given:
                     drifts = [n for n, errors in _defined(answer)[1].items() if n in given and errors.max() > bound]
                     advice = (yield from _drift_advice(traits, answer, drifts[0], bound)) if drifts else ""
